@@ -1,0 +1,102 @@
+//! A clip: a tree of joints and their sampled rigid local transforms, in canonical space.
+
+use nalgebra::Isometry3;
+use serde::{Deserialize, Serialize};
+
+/// One joint of a clip's tree. Parents stand before their children.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    pub name: String,
+    /// Index of the parent joint; `None` for a root.
+    pub parent: Option<usize>,
+    /// Rest transform, parent from joint, in metres.
+    pub rest: Isometry3<f64>,
+}
+
+/// What happens when the end of a clip or motion is reached.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LoopMode {
+    /// The last frame is the first frame of the next cycle, moved on by the cycle's travel.
+    Wrap,
+    /// It is performed once, and then ends.
+    Clamp,
+}
+
+/// How much a problem matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    Note,
+    Warning,
+    Error,
+}
+
+/// Something found in a file that its owner should know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Problem {
+    /// Stable identifier in kebab-case, e.g. `turned-to-forward`.
+    pub id: String,
+    pub severity: Severity,
+    pub message: String,
+}
+
+/// Where a clip comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// File name without folders.
+    pub file: String,
+    /// Lower-case hexadecimal SHA-256 of the file's bytes.
+    pub sha256: String,
+    /// `fbx`, `gltf` or `deepmimic`.
+    pub format: String,
+    pub take: String,
+    /// Frame rate that the file states, in Hz.
+    pub fps: f64,
+    /// Up axis of the file, e.g. `+Y`.
+    pub up_axis: String,
+    /// Metres per unit of the file.
+    pub unit_m: f64,
+}
+
+/// A joint tree and its motion, sampled at a constant rate.
+///
+/// Transforms are rigid: scale in the source file is resolved so that every joint's world position is exact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clip {
+    pub name: String,
+    /// Frames per second.
+    pub fps: f64,
+    pub loop_mode: LoopMode,
+    pub joints: Vec<Joint>,
+    /// `frames[f][j]`: transform of joint `j` in its parent at time `f / fps`.
+    pub frames: Vec<Vec<Isometry3<f64>>>,
+    pub source: Source,
+    pub problems: Vec<Problem>,
+}
+
+impl Clip {
+    /// Seconds from the first frame to the last.
+    pub fn duration(&self) -> f64 {
+        self.frames.len().saturating_sub(1) as f64 / self.fps
+    }
+
+    /// World transforms of all joints at frame `frame`.
+    pub fn world(&self, frame: usize) -> Vec<Isometry3<f64>> {
+        self.compose(|j| self.frames[frame][j])
+    }
+
+    /// World transforms of all joints in the rest pose.
+    pub fn rest_world(&self) -> Vec<Isometry3<f64>> {
+        self.compose(|j| self.joints[j].rest)
+    }
+
+    fn compose(&self, local: impl Fn(usize) -> Isometry3<f64>) -> Vec<Isometry3<f64>> {
+        let mut world: Vec<Isometry3<f64>> = Vec::with_capacity(self.joints.len());
+        for (j, joint) in self.joints.iter().enumerate() {
+            let parent = joint.parent.map_or_else(Isometry3::identity, |p| world[p]);
+            world.push(parent * local(j));
+        }
+        world
+    }
+}

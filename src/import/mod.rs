@@ -1,0 +1,3 @@
+//! Bytes of an animation file become a [`Clip`](crate::clip::Clip).
+
+mod scene;
