@@ -1,1 +1,79 @@
-//! To be built.
+//! The only room that knows rapier: a character under drives, gravity and ground contact.
+//!
+//! Bodies are joined by rapier's impulse joints (maximal coordinates): on the characters that mimic is made for
+//! they cost a tenth of its multibodies, and a spherical multibody joint cannot be driven by position. What needs
+//! care is handled here and nowhere else:
+//! the drive frame of ball joints ([`World::set_targets`]), resets without a memory ([`World::reset`]), sleeping,
+//! damping and speed caps (off), and quarantined bodies ([`Diverged`]).
+
+mod build;
+mod character;
+mod convert;
+#[cfg(test)]
+mod tests;
+mod world;
+
+pub use character::{Character, Link, LinkJoint};
+pub use world::{LinkState, Target, World};
+
+use serde::{Deserialize, Serialize};
+
+/// Rates and solver settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Control steps per second; default 30.
+    pub control_hz: f64,
+    /// rapier steps in one control step; default 2.
+    pub steps_per_control: u32,
+    /// Substeps in one rapier step, each of which integrates joints, drives and contacts; default 4.
+    pub substeps: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            control_hz: 30.0,
+            steps_per_control: 2,
+            substeps: 4,
+        }
+    }
+}
+
+impl Settings {
+    /// Seconds of one control step.
+    pub fn control_dt(&self) -> f64 {
+        1.0 / self.control_hz
+    }
+
+    /// Rate at which joints and contacts are integrated, in Hz.
+    pub fn physics_hz(&self) -> f64 {
+        self.control_hz * f64::from(self.steps_per_control * self.substeps)
+    }
+}
+
+/// The state stopped being finite or left the world; the episode has to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the simulation diverged")]
+pub struct Diverged;
+
+/// Why a skeleton can't be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    #[error(
+        "body `{body}` slides on joint `{joint}`, and only free, ball and hinge joints can be simulated"
+    )]
+    SlideJoint { body: String, joint: String },
+    #[error(
+        "body `{body}` has {count} joints; one ball joint or up to three hinges can be simulated"
+    )]
+    TooManyJoints { body: String, count: usize },
+    #[error("the root body `{body}` must have a free joint and nothing else")]
+    RootIsNotFree { body: String },
+    #[error("body `{body}` starts a second character; only one root is simulated")]
+    SecondRoot { body: String },
+    #[error("body `{body}` has no mass, so no force can move it: give it a shape or an inertial")]
+    Massless { body: String },
+    #[error("the skeleton has no bodies")]
+    Empty,
+}

@@ -1,0 +1,185 @@
+//! The rapier world of a character, as it is before its first step.
+
+use super::character::{Character, Link, LinkJoint, x_along};
+use super::{Settings, convert};
+use crate::skeleton::{Drive, Shape};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use rapier3d::prelude::*;
+
+/// Everything of a rapier world that a step can change.
+#[derive(Clone)]
+pub(super) struct Scene {
+    pub islands: IslandManager,
+    pub broad_phase: BroadPhaseBvh,
+    pub narrow_phase: NarrowPhase,
+    pub bodies: RigidBodySet,
+    pub colliders: ColliderSet,
+    pub joints: ImpulseJointSet,
+}
+
+/// A scene and the handles into it, in the order of the character's links.
+pub(super) struct Built {
+    pub scene: Scene,
+    pub bodies: Vec<RigidBodyHandle>,
+    /// `None` for the root.
+    pub joints: Vec<Option<ImpulseJointHandle>>,
+    pub ground: ColliderHandle,
+}
+
+const CHARACTER: Group = Group::GROUP_1;
+const GROUND: Group = Group::GROUP_2;
+
+pub(super) fn parameters(settings: &Settings) -> IntegrationParameters {
+    IntegrationParameters {
+        dt: (settings.control_dt() / f64::from(settings.steps_per_control)) as f32,
+        num_solver_iterations: settings.substeps as usize,
+        // Feet stand by true Coulomb friction at each contact point; the default lumps four points into one.
+        friction_model: FrictionModel::Coulomb,
+        // The ground is a half space: nothing can tunnel through it.
+        max_ccd_substeps: 0,
+        normalized_max_linear_velocity: f32::MAX,
+        // A reference may start a little inside the ground; it must be lifted out, not shot out.
+        normalized_max_corrective_velocity: 0.5,
+        ..IntegrationParameters::default()
+    }
+}
+
+pub(super) fn build(character: &Character) -> Built {
+    let mut scene = Scene {
+        islands: IslandManager::new(),
+        broad_phase: BroadPhaseBvh::default(),
+        narrow_phase: NarrowPhase::new(),
+        bodies: RigidBodySet::new(),
+        colliders: ColliderSet::new(),
+        joints: ImpulseJointSet::new(),
+    };
+    let ground = scene.colliders.insert(ground());
+    let mut bodies = Vec::new();
+    let mut joints = Vec::new();
+    for (index, link) in character.links.iter().enumerate() {
+        let handle = scene.bodies.insert(body(link));
+        for shape in &link.shapes {
+            let collider = collider(shape, link.friction, index);
+            scene
+                .colliders
+                .insert_with_parent(collider, handle, &mut scene.bodies);
+        }
+        let joint = link
+            .parent
+            .map(|p| scene.joints.insert(bodies[p], handle, joint(link), false));
+        bodies.push(handle);
+        joints.push(joint);
+    }
+    Built {
+        scene,
+        bodies,
+        joints,
+        ground,
+    }
+}
+
+fn ground() -> ColliderBuilder {
+    // Friction is the character's alone: the larger of the two counts, and the ground has none.
+    ColliderBuilder::halfspace(Unit::new_unchecked(Vector::Z))
+        .friction(0.0)
+        .friction_combine_rule(CoefficientCombineRule::Max)
+        .collision_groups(InteractionGroups::new(
+            GROUND,
+            CHARACTER,
+            InteractionTestMode::And,
+        ))
+}
+
+fn body(link: &Link) -> RigidBody {
+    let mass = MassProperties::with_inertia_matrix(
+        convert::vector(link.com.cast()),
+        link.mass as f32,
+        convert::matrix(&link.inertia.cast()),
+    );
+    RigidBodyBuilder::dynamic()
+        .additional_mass_properties(mass)
+        .linear_damping(0.0)
+        .angular_damping(0.0)
+        .can_sleep(false)
+        .allow_fast_rotation(true)
+        .build()
+}
+
+fn collider(shape: &Shape, friction: f64, link: usize) -> Collider {
+    let vector = |v: &Vector3<f64>| convert::vector(v.cast());
+    let builder = match shape {
+        Shape::Sphere { center, radius } => {
+            ColliderBuilder::ball(*radius as f32).translation(vector(center))
+        }
+        Shape::Capsule { a, b, radius } => {
+            ColliderBuilder::capsule_from_endpoints(vector(a), vector(b), *radius as f32)
+        }
+        Shape::Box { pose, half } => {
+            ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)
+                .position(convert::pose(&pose.cast()))
+        }
+    };
+    builder
+        .density(0.0)
+        .friction(friction as f32)
+        .friction_combine_rule(CoefficientCombineRule::Max)
+        .collision_groups(InteractionGroups::new(
+            CHARACTER,
+            GROUND,
+            InteractionTestMode::And,
+        ))
+        .user_data(link as u128)
+        .build()
+}
+
+fn joint(link: &Link) -> GenericJoint {
+    let parent_anchor = link.rest * nalgebra::Point3::from(link.anchor);
+    let frame = |at: Vector3<f64>, turn: UnitQuaternion<f64>| {
+        convert::pose(&Isometry3::from_parts(Translation3::from(at), turn).cast())
+    };
+    let axes = basis(&link.joint);
+    let builder = match &link.joint {
+        LinkJoint::Hinge { .. } => GenericJointBuilder::new(JointAxesMask::LOCKED_REVOLUTE_AXES),
+        LinkJoint::Ball {
+            locked: Some(_), ..
+        } => GenericJointBuilder::new(JointAxesMask::LOCKED_SPHERICAL_AXES | JointAxesMask::ANG_X),
+        _ => GenericJointBuilder::new(JointAxesMask::LOCKED_SPHERICAL_AXES),
+    };
+    let mut joint = builder
+        .local_frame1(frame(parent_anchor.coords, link.rest.rotation * axes))
+        .local_frame2(frame(link.anchor, axes))
+        .contacts_enabled(false)
+        .build();
+    for (axis, drive) in drives(&link.joint) {
+        joint
+            .set_motor_model(axis, MotorModel::ForceBased)
+            .set_motor_position(axis, 0.0, drive.kp as f32, drive.kd as f32)
+            .set_motor_max_force(axis, drive.force_limit.min(f64::from(f32::MAX)) as f32);
+    }
+    joint
+}
+
+/// The joint frame's axes in the link's frame: X along a hinge, or along a ball's locked direction.
+pub(super) fn basis(joint: &LinkJoint) -> UnitQuaternion<f64> {
+    match joint {
+        LinkJoint::Hinge { axis, .. } => x_along(axis),
+        LinkJoint::Ball {
+            locked: Some(axis), ..
+        } => x_along(axis),
+        _ => UnitQuaternion::identity(),
+    }
+}
+
+fn drives(joint: &LinkJoint) -> Vec<(JointAxis, Drive)> {
+    let [x, y, z] = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ];
+    match joint {
+        LinkJoint::Free => Vec::new(),
+        LinkJoint::Hinge { drive, .. } => vec![(x, *drive)],
+        LinkJoint::Ball {
+            drives,
+            locked: Some(_),
+            ..
+        } => vec![(y, drives[1]), (z, drives[2])],
+        LinkJoint::Ball { drives, .. } => vec![(x, drives[0]), (y, drives[1]), (z, drives[2])],
+    }
+}

@@ -1,0 +1,268 @@
+//! A skeleton as the simulation sees it: welded bodies are one link, and a link has one joint.
+
+use super::SimError;
+use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton};
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// How a link turns in its parent.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LinkJoint {
+    /// The root: moves freely.
+    Free,
+    /// Turns any way about the anchor. `axes` are the free directions where there are fewer than three.
+    Ball {
+        drives: [Drive; 3],
+        limits: [[f64; 2]; 3],
+        locked: Option<Vector3<f64>>,
+    },
+    /// Turns about a unit axis in the link's frame.
+    Hinge {
+        axis: Vector3<f64>,
+        drive: Drive,
+        limit: [f64; 2],
+    },
+}
+
+impl LinkJoint {
+    /// Number of drive coordinates: 3 for a ball, 1 for a hinge.
+    pub fn dof(&self) -> usize {
+        match self {
+            LinkJoint::Free => 0,
+            LinkJoint::Ball { .. } => 3,
+            LinkJoint::Hinge { .. } => 1,
+        }
+    }
+}
+
+/// A rigid piece of the character: a body and what is welded to it.
+#[derive(Clone, Debug)]
+pub struct Link {
+    pub name: String,
+    /// The skeleton's body whose frame is this link's frame.
+    pub body: usize,
+    /// Index of the parent link.
+    pub parent: Option<usize>,
+    /// Parent link from this link at zero joint coordinates.
+    pub rest: Isometry3<f64>,
+    pub joint: LinkJoint,
+    /// Where the link's joint turns, in its own frame, metres.
+    pub anchor: Vector3<f64>,
+    /// First drive coordinate of this link.
+    pub dof: usize,
+    /// kg.
+    pub mass: f64,
+    /// In the link's frame, metres.
+    pub com: Vector3<f64>,
+    /// About the centre of mass, along the link's axes, kg·m².
+    pub inertia: Matrix3<f64>,
+    pub shapes: Vec<Shape>,
+    pub friction: f64,
+}
+
+/// The character as a tree of links. Parents stand before their children.
+#[derive(Clone, Debug)]
+pub struct Character {
+    pub links: Vec<Link>,
+    /// Drive coordinates in all.
+    pub dof: usize,
+    /// For every body of the skeleton: its link, and the transform link from body.
+    pub bodies: Vec<(usize, Isometry3<f64>)>,
+}
+
+impl Character {
+    /// Merges welded bodies into links.
+    ///
+    /// # Errors
+    /// A skeleton whose joints impulse joints cannot express.
+    pub fn new(skeleton: &Skeleton) -> Result<Self, SimError> {
+        let mut character = Character {
+            links: Vec::new(),
+            dof: 0,
+            bodies: Vec::new(),
+        };
+        for (index, body) in skeleton.bodies.iter().enumerate() {
+            match body.parent {
+                Some(parent) if body.joints.is_empty() => character.weld(body, parent),
+                parent => character.add(index, body, parent)?,
+            }
+        }
+        match character.links.iter().find(|link| link.mass <= 0.0) {
+            Some(link) => Err(SimError::Massless {
+                body: link.name.clone(),
+            }),
+            None if character.links.is_empty() => Err(SimError::Empty),
+            None => Ok(character),
+        }
+    }
+
+    fn add(&mut self, index: usize, body: &Body, parent: Option<usize>) -> Result<(), SimError> {
+        let joint = link_joint(body, parent.is_none())?;
+        if parent.is_none() && !self.links.is_empty() {
+            return Err(SimError::SecondRoot {
+                body: body.name.clone(),
+            });
+        }
+        let at = parent.map(|p| self.bodies[p]);
+        let dof = self.dof;
+        self.dof += joint.dof();
+        self.bodies.push((self.links.len(), Isometry3::identity()));
+        self.links.push(Link {
+            name: body.name.clone(),
+            body: index,
+            parent: at.map(|(link, _)| link),
+            rest: at.map_or_else(Isometry3::identity, |(_, offset)| offset * body.rest),
+            joint,
+            anchor: body
+                .joints
+                .first()
+                .map_or_else(Vector3::zeros, |j| j.anchor),
+            dof,
+            mass: body.mass,
+            com: body.com,
+            inertia: body.inertia,
+            shapes: body.shapes.clone(),
+            friction: body.friction,
+        });
+        Ok(())
+    }
+
+    fn weld(&mut self, body: &Body, parent: usize) {
+        let (link, offset) = self.bodies[parent];
+        let at = offset * body.rest;
+        self.bodies.push((link, at));
+        let link = &mut self.links[link];
+        link.shapes
+            .extend(body.shapes.iter().map(|shape| moved(shape, &at)));
+        let com = (at * nalgebra::Point3::from(body.com)).coords;
+        let turn = at.rotation.to_rotation_matrix();
+        let inertia = turn * body.inertia * turn.inverse();
+        let mass = link.mass + body.mass;
+        if mass > 0.0 {
+            let center = (link.com * link.mass + com * body.mass) / mass;
+            link.inertia +=
+                shifted(link.mass, link.com - center) + inertia + shifted(body.mass, com - center);
+            link.com = center;
+            link.mass = mass;
+        }
+    }
+
+    /// Joint rotation of link `link` from the rotations of all links: identity at rest.
+    pub fn joint_rotation(
+        &self,
+        link: usize,
+        parent: UnitQuaternion<f32>,
+        child: UnitQuaternion<f32>,
+    ) -> UnitQuaternion<f32> {
+        self.links[link].rest.rotation.cast::<f32>().inverse() * parent.inverse() * child
+    }
+}
+
+/// Inertia of a point mass at `r` (parallel axis theorem).
+fn shifted(mass: f64, r: Vector3<f64>) -> Matrix3<f64> {
+    (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * mass
+}
+
+fn moved(shape: &Shape, by: &Isometry3<f64>) -> Shape {
+    let point = |p: &Vector3<f64>| (by * nalgebra::Point3::from(*p)).coords;
+    match shape {
+        Shape::Sphere { center, radius } => Shape::Sphere {
+            center: point(center),
+            radius: *radius,
+        },
+        Shape::Capsule { a, b, radius } => Shape::Capsule {
+            a: point(a),
+            b: point(b),
+            radius: *radius,
+        },
+        Shape::Box { pose, half } => Shape::Box {
+            pose: by * pose,
+            half: *half,
+        },
+    }
+}
+
+fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
+    let name = || body.name.clone();
+    if is_root {
+        return match body.joints.as_slice() {
+            [joint] if joint.kind == JointKind::Free => Ok(LinkJoint::Free),
+            _ => Err(SimError::RootIsNotFree { body: name() }),
+        };
+    }
+    let mut hinges = Vec::new();
+    for joint in &body.joints {
+        match joint.kind {
+            JointKind::Ball if body.joints.len() == 1 => {
+                return Ok(LinkJoint::Ball {
+                    drives: [joint.drives[0], joint.drives[1], joint.drives[2]],
+                    limits: [joint.limits[0], joint.limits[1], joint.limits[2]],
+                    locked: None,
+                });
+            }
+            JointKind::Hinge(axis) => hinges.push((axis, joint.drives[0], joint.limits[0])),
+            JointKind::Slide(_) => {
+                return Err(SimError::SlideJoint {
+                    body: name(),
+                    joint: joint.name.clone(),
+                });
+            }
+            _ => {
+                return Err(SimError::TooManyJoints {
+                    body: name(),
+                    count: body.joints.len(),
+                });
+            }
+        }
+    }
+    match hinges.as_slice() {
+        [(axis, drive, limit)] => Ok(LinkJoint::Hinge {
+            axis: *axis,
+            drive: *drive,
+            limit: *limit,
+        }),
+        [_, _] | [_, _, _] => Ok(ball_of_hinges(&hinges)),
+        _ => Err(SimError::TooManyJoints {
+            body: name(),
+            count: body.joints.len(),
+        }),
+    }
+}
+
+/// Hinges that meet in one body act as a ball joint whose gains are those of the nearest hinge.
+fn ball_of_hinges(hinges: &[(Vector3<f64>, Drive, [f64; 2])]) -> LinkJoint {
+    let nearest = |axis: Vector3<f64>| {
+        let mut best = hinges[0];
+        for hinge in hinges {
+            if hinge.0.dot(&axis).abs() > best.0.dot(&axis).abs() {
+                best = *hinge;
+            }
+        }
+        let flip = best.0.dot(&axis) < 0.0;
+        (
+            best.1,
+            if flip {
+                [-best.2[1], -best.2[0]]
+            } else {
+                best.2
+            },
+        )
+    };
+    let along = [
+        nearest(Vector3::x()),
+        nearest(Vector3::y()),
+        nearest(Vector3::z()),
+    ];
+    let locked = (hinges.len() == 2).then(|| hinges[0].0.cross(&hinges[1].0).normalize());
+    LinkJoint::Ball {
+        drives: along.map(|a| a.0),
+        limits: along.map(|a| a.1),
+        locked,
+    }
+}
+
+/// A rotation whose X axis is `axis`.
+pub(super) fn x_along(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let turn = Rotation3::rotation_between(&Vector3::x(), axis)
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI));
+    UnitQuaternion::from_rotation_matrix(&turn)
+}

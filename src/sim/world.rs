@@ -1,0 +1,222 @@
+//! One character on one ground.
+
+use super::build::{self, Built, Scene};
+use super::character::{Character, LinkJoint};
+use super::{Diverged, Settings, convert};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rapier3d::prelude::*;
+
+/// Where a link is and how it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkState {
+    /// World from link.
+    pub pose: Isometry3<f32>,
+    /// Velocity of the link frame's origin, world axes, m/s.
+    pub linear: Vector3<f32>,
+    /// World axes, rad/s.
+    pub angular: Vector3<f32>,
+}
+
+/// Where a drive should turn its link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// The root has no drive.
+    Free,
+    /// Joint rotation, identity at rest.
+    Ball(UnitQuaternion<f32>),
+    /// Joint angle, zero at rest, radians.
+    Hinge(f32),
+}
+
+/// A character that moves under its drives.
+pub struct World {
+    settings: Settings,
+    parameters: IntegrationParameters,
+    pipeline: PhysicsPipeline,
+    pristine: Scene,
+    scene: Scene,
+    multibodies: MultibodyJointSet,
+    soft_bodies: SoftBodySet,
+    ccd: CCDSolver,
+    bodies: Vec<RigidBodyHandle>,
+    joints: Vec<Option<ImpulseJointHandle>>,
+    /// Per link: rotation of the joint's first frame at rest, in the parent's frame, and the joint's own axes.
+    frames: Vec<(UnitQuaternion<f32>, UnitQuaternion<f32>)>,
+    ground: ColliderHandle,
+    coms: Vec<Vector3<f32>>,
+    states: Vec<LinkState>,
+    contacts: Vec<bool>,
+}
+
+impl World {
+    pub fn new(character: &Character, settings: Settings) -> Self {
+        let Built {
+            scene,
+            bodies,
+            joints,
+            ground,
+        } = build::build(character);
+        let at_rest = LinkState {
+            pose: Isometry3::identity(),
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+        };
+        World {
+            settings,
+            parameters: build::parameters(&settings),
+            pipeline: PhysicsPipeline::new(),
+            pristine: scene.clone(),
+            scene,
+            multibodies: MultibodyJointSet::new(),
+            soft_bodies: SoftBodySet::new(),
+            ccd: CCDSolver::new(),
+            frames: character
+                .links
+                .iter()
+                .map(|link| {
+                    let axes = build::basis(&link.joint);
+                    (link.rest.rotation.cast(), axes.cast())
+                })
+                .collect(),
+            ground,
+            coms: character.links.iter().map(|link| link.com.cast()).collect(),
+            states: vec![at_rest; bodies.len()],
+            contacts: vec![false; bodies.len()],
+            bodies,
+            joints,
+        }
+    }
+
+    /// Puts every link where `states` says, with nothing left of the past.
+    ///
+    /// rapier starts a step's contacts from the impulses of the step before, also when the bodies were teleported
+    /// in between, and keeps islands, contact pairs and their order. So a reset works on a copy of the world as it
+    /// was built, and gives the same bits as a new one.
+    pub fn reset(&mut self, states: &[LinkState]) {
+        self.scene.clone_from(&self.pristine);
+        for (i, state) in states.iter().enumerate() {
+            let body = &mut self.scene.bodies[self.bodies[i]];
+            let arm = state.pose.rotation * self.coms[i];
+            body.set_position(convert::pose(&state.pose), false);
+            body.set_linvel(
+                convert::vector(state.linear + state.angular.cross(&arm)),
+                false,
+            );
+            body.set_angvel(convert::vector(state.angular), false);
+        }
+        self.states.copy_from_slice(states);
+        self.contacts.fill(false);
+    }
+
+    /// Sets what the drives hold until the next call; one target per link.
+    ///
+    /// rapier's motors measure a ball joint's error axis by axis as 2·asin of the quaternion's imaginary part, which
+    /// is wrong far from zero. So the joint's first frame is turned to the target, and the motors hold zero: there
+    /// the measure is exact to third order, and every ball is a true spherical PD drive.
+    pub fn set_targets(&mut self, targets: &[Target]) {
+        for (i, target) in targets.iter().enumerate() {
+            let Some(handle) = self.joints[i] else {
+                continue;
+            };
+            let Some(joint) = self.scene.joints.get_mut(handle, false) else {
+                continue;
+            };
+            let (rest, axes) = self.frames[i];
+            match target {
+                Target::Free => {}
+                Target::Ball(turn) => {
+                    joint.data.local_frame1.rotation = convert::rotation(rest * turn * axes)
+                }
+                Target::Hinge(angle) => {
+                    joint.data.motors[JointAxis::AngX as usize].target_pos = *angle
+                }
+            }
+        }
+    }
+
+    /// Advances by one control step.
+    ///
+    /// # Errors
+    /// [`Diverged`] when a body stopped being finite; the world then needs a reset.
+    pub fn step(&mut self) -> Result<(), Diverged> {
+        for _ in 0..self.settings.steps_per_control {
+            self.pipeline.step(
+                Vector::new(0.0, 0.0, -9.81),
+                &self.parameters,
+                &mut self.scene.islands,
+                &mut self.scene.broad_phase,
+                &mut self.scene.narrow_phase,
+                &mut self.scene.bodies,
+                &mut self.scene.colliders,
+                &mut self.scene.joints,
+                &mut self.multibodies,
+                &mut self.soft_bodies,
+                &mut self.ccd,
+                &(),
+                &(),
+            );
+            if !self.pipeline.quarantine().bodies().is_empty() {
+                return Err(Diverged);
+            }
+        }
+        self.read_states();
+        self.read_contacts();
+        if self
+            .states
+            .iter()
+            .all(|s| s.pose.translation.vector.norm() < 1e4)
+        {
+            Ok(())
+        } else {
+            Err(Diverged)
+        }
+    }
+
+    /// One state per link, after the last step or reset.
+    pub fn states(&self) -> &[LinkState] {
+        &self.states
+    }
+
+    /// Per link: whether it pressed on the ground in the last step.
+    pub fn contacts(&self) -> &[bool] {
+        &self.contacts
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn read_states(&mut self) {
+        for ((state, handle), com) in self.states.iter_mut().zip(&self.bodies).zip(&self.coms) {
+            let body = &self.scene.bodies[*handle];
+            state.pose = convert::from_pose(body.position());
+            state.angular = convert::from_vector(body.angvel());
+            let arm = state.pose.rotation * com;
+            state.linear = convert::from_vector(body.linvel()) - state.angular.cross(&arm);
+        }
+    }
+
+    fn read_contacts(&mut self) {
+        self.contacts.fill(false);
+        for pair in self.scene.narrow_phase.contact_pairs_with(self.ground) {
+            let other = if pair.collider1 == self.ground {
+                pair.collider2
+            } else {
+                pair.collider1
+            };
+            let pressed = pair.total_impulse_magnitude() > 0.0;
+            if pressed && let Some(collider) = self.scene.colliders.get(other) {
+                self.contacts[collider.user_data as usize] = true;
+            }
+        }
+    }
+}
+
+/// The target that holds a joint at rotation `turn`.
+pub(crate) fn target_of(joint: &LinkJoint, turn: UnitQuaternion<f32>) -> Target {
+    match joint {
+        LinkJoint::Free => Target::Free,
+        LinkJoint::Ball { .. } => Target::Ball(turn),
+        LinkJoint::Hinge { axis, .. } => Target::Hinge(turn.scaled_axis().dot(&axis.cast())),
+    }
+}
