@@ -5,6 +5,17 @@
 //! world and angular in the body's own frame; a ball joint is a quaternion, its velocity in the child's frame;
 //! several hinges on one body turn it one after the other.
 
+mod drive;
+mod error;
+mod guard;
+mod inertia;
+mod kinematics;
+mod load;
+mod shape;
+mod slots;
+
+pub use error::SkeletonError;
+
 use crate::humanoid::Slot;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -111,3 +122,6 @@ pub struct Twist {
     /// Angular velocity, world axes, rad/s.
     pub angular: Vector3<f64>,
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,139 @@
+//! Forward kinematics and body velocities, stage for stage as MuJoCo's `mj_kinematics` and `mj_comVel`.
+
+use super::{Joint, JointKind, Skeleton, Twist};
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+
+/// Unit quaternion at `qpos[at..at + 4]`, scalar first.
+///
+/// The caller has checked the length of `qpos`; a zero quaternion stands for no rotation, as in MuJoCo.
+pub(super) fn quaternion(qpos: &[f64], at: usize) -> UnitQuaternion<f64> {
+    let q = Quaternion::new(qpos[at], qpos[at + 1], qpos[at + 2], qpos[at + 3]);
+    Unit::try_new(q, 1e-12).unwrap_or_else(UnitQuaternion::identity)
+}
+
+pub(super) fn vector(values: &[f64], at: usize) -> Vector3<f64> {
+    Vector3::new(values[at], values[at + 1], values[at + 2])
+}
+
+impl Joint {
+    /// Rotation that the joint's coordinates make, in the child's frame; of a free joint its orientation.
+    pub(super) fn rotation(&self, qpos: &[f64]) -> UnitQuaternion<f64> {
+        match self.kind {
+            JointKind::Free => quaternion(qpos, self.qpos + 3),
+            JointKind::Ball => quaternion(qpos, self.qpos),
+            JointKind::Hinge(axis) => {
+                UnitQuaternion::from_axis_angle(&Unit::new_unchecked(axis), qpos[self.qpos])
+            }
+            JointKind::Slide(_) => UnitQuaternion::identity(),
+        }
+    }
+
+    /// World from body after this joint, from world from body before it.
+    fn apply(&self, before: &Isometry3<f64>, qpos: &[f64]) -> Isometry3<f64> {
+        match self.kind {
+            JointKind::Free => Isometry3::from_parts(
+                Translation3::from(vector(qpos, self.qpos)),
+                self.rotation(qpos),
+            ),
+            JointKind::Slide(axis) => before * Translation3::from(axis * qpos[self.qpos]),
+            JointKind::Ball | JointKind::Hinge(_) => {
+                let turn = self.rotation(qpos);
+                let shift = self.anchor - turn * self.anchor;
+                before * Isometry3::from_parts(shift.into(), turn)
+            }
+        }
+    }
+}
+
+impl Skeleton {
+    /// World from body for every body at `qpos` (MuJoCo's `xpos` and `xquat`).
+    ///
+    /// # Panics
+    /// If `qpos` is shorter than [`Skeleton::nq`].
+    pub fn forward(&self, qpos: &[f64]) -> Vec<Isometry3<f64>> {
+        let mut world: Vec<Isometry3<f64>> = Vec::with_capacity(self.bodies.len());
+        for body in &self.bodies {
+            let parent = body.parent.map_or_else(Isometry3::identity, |p| world[p]);
+            let at = body
+                .joints
+                .iter()
+                .fold(parent * body.rest, |at, joint| joint.apply(&at, qpos));
+            world.push(at);
+        }
+        world
+    }
+
+    /// World velocities of every body at `qpos` and `qvel`.
+    ///
+    /// # Panics
+    /// If `qpos` is shorter than [`Skeleton::nq`] or `qvel` than [`Skeleton::nv`].
+    pub fn twists(&self, qpos: &[f64], qvel: &[f64]) -> Vec<Twist> {
+        let world = self.forward(qpos);
+        let mut twists: Vec<Twist> = Vec::with_capacity(self.bodies.len());
+        for (index, body) in self.bodies.iter().enumerate() {
+            let origin = world[index].translation.vector;
+            let (mut at, mut twist) = match body.parent {
+                Some(p) => (world[p], twists[p].at(&world[p], &origin)),
+                None => (Isometry3::identity(), Twist::default()),
+            };
+            at *= body.rest;
+            for joint in &body.joints {
+                let next = joint.apply(&at, qpos);
+                joint.add_velocity(&at, &next, &origin, qvel, &mut twist);
+                at = next;
+            }
+            twists.push(twist);
+        }
+        twists
+    }
+}
+
+impl Joint {
+    /// Adds what the joint's rate gives the body whose final origin is `origin`.
+    fn add_velocity(
+        &self,
+        before: &Isometry3<f64>,
+        after: &Isometry3<f64>,
+        origin: &Vector3<f64>,
+        qvel: &[f64],
+        twist: &mut Twist,
+    ) {
+        let angular = match self.kind {
+            JointKind::Free => {
+                twist.linear += vector(qvel, self.dof);
+                twist.angular += after.rotation * vector(qvel, self.dof + 3);
+                return;
+            }
+            JointKind::Slide(axis) => {
+                twist.linear += before.rotation * axis * qvel[self.dof];
+                return;
+            }
+            JointKind::Ball => after.rotation * vector(qvel, self.dof),
+            JointKind::Hinge(axis) => before.rotation * axis * qvel[self.dof],
+        };
+        let anchor = before * nalgebra::Point3::from(self.anchor);
+        twist.angular += angular;
+        twist.linear += angular.cross(&(origin - anchor.coords));
+    }
+}
+
+impl Default for Twist {
+    /// At rest.
+    fn default() -> Self {
+        Self {
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+        }
+    }
+}
+
+impl Twist {
+    /// The same motion, with its linear part taken at world point `point` instead of the origin of `body`.
+    pub fn at(&self, body: &Isometry3<f64>, point: &Vector3<f64>) -> Self {
+        let arm = point - body.translation.vector;
+        Self {
+            linear: self.linear + self.angular.cross(&arm),
+            angular: self.angular,
+        }
+    }
+}

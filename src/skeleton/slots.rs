@@ -1,0 +1,95 @@
+//! Which body stands for which humanoid slot: from the JSON beside the MJCF, or by the bodies' names.
+
+use super::Body;
+use crate::humanoid::Slot;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+#[derive(Deserialize)]
+struct SlotFile {
+    slots: BTreeMap<Slot, String>,
+}
+
+/// Reads `{"slots": {"hips": "pelvis", …}}`.
+pub(super) fn from_json(text: &str, bodies: &[Body]) -> Result<BTreeMap<Slot, usize>, String> {
+    let file: SlotFile = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    file.slots
+        .into_iter()
+        .map(|(slot, name)| {
+            let body = bodies.iter().position(|b| b.name == name);
+            body.map(|b| (slot, b))
+                .ok_or_else(|| format!("no body is called `{name}`"))
+        })
+        .collect()
+}
+
+/// Guesses from body names; of several bodies for one slot the first stands.
+pub(super) fn from_names(bodies: &[Body]) -> BTreeMap<Slot, usize> {
+    let mut slots = BTreeMap::new();
+    for (index, body) in bodies.iter().enumerate() {
+        if let Some(slot) = slot_of_name(&body.name) {
+            slots.entry(slot).or_insert(index);
+        }
+    }
+    slots
+}
+
+fn slot_of_name(name: &str) -> Option<Slot> {
+    let name = name.to_lowercase().replace(['-', '.', ' '], "_");
+    let (side, part) = split_side(&name);
+    match (side, part) {
+        (None, "pelvis" | "hips" | "hip" | "root") => Some(Slot::Hips),
+        (None, "torso" | "chest" | "thorax" | "upperback") => Some(Slot::Chest),
+        (None, "neck" | "upperneck") => Some(Slot::Neck),
+        (None, "head") => Some(Slot::Head),
+        (Some(side), part) => limb(part).map(|(left, right)| match side {
+            Side::Left => left,
+            Side::Right => right,
+        }),
+        _ => None,
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Side {
+    Left,
+    Right,
+}
+
+/// Splits `left_thigh`, `l_thigh`, `lthigh` and `thigh_left` into side and part.
+fn split_side(name: &str) -> (Option<Side>, &str) {
+    for (word, side) in [
+        ("left", Side::Left),
+        ("right", Side::Right),
+        ("l", Side::Left),
+        ("r", Side::Right),
+    ] {
+        if let Some(part) = name.strip_prefix(word) {
+            let part = part.trim_start_matches('_');
+            if limb(part).is_some() {
+                return (Some(side), part);
+            }
+        }
+        if let Some(part) = name.strip_suffix(word).and_then(|p| p.strip_suffix('_')) {
+            return (Some(side), part);
+        }
+    }
+    (None, name)
+}
+
+/// Left and right slot of a limb's part.
+fn limb(part: &str) -> Option<(Slot, Slot)> {
+    Some(match part {
+        "thigh" | "upper_leg" | "femur" => (Slot::LeftUpperLeg, Slot::RightUpperLeg),
+        "shin" | "lower_leg" | "tibia" | "calf" => (Slot::LeftLowerLeg, Slot::RightLowerLeg),
+        "foot" | "ankle" => (Slot::LeftFoot, Slot::RightFoot),
+        "toe" | "toes" => (Slot::LeftToes, Slot::RightToes),
+        "shoulder" | "clavicle" => (Slot::LeftShoulder, Slot::RightShoulder),
+        "upper_arm" | "upperarm" | "uarm" | "humerus" => (Slot::LeftUpperArm, Slot::RightUpperArm),
+        "lower_arm" | "lowerarm" | "larm" | "forearm" | "radius" => {
+            (Slot::LeftLowerArm, Slot::RightLowerArm)
+        }
+        "hand" | "wrist" => (Slot::LeftHand, Slot::RightHand),
+        _ => return None,
+    })
+}
