@@ -33,6 +33,13 @@ pub(super) fn parameters(settings: &Settings) -> IntegrationParameters {
     IntegrationParameters {
         dt: (settings.control_dt() / f64::from(settings.steps_per_control)) as f32,
         num_solver_iterations: settings.substeps as usize,
+        // Contacts that start from the last step's impulses throw a character with stiff drives off its feet: held
+        // in its rest pose it hops 4 cm. Started from zero they settle, given enough sweeps.
+        warmstart_coefficient: 0.0,
+        num_internal_pgs_iterations: 4,
+        // The relaxing pass turns joints' position errors into spin: in flight, angular momentum drifts by 3 % a
+        // second with it, by 0.4 % without.
+        num_internal_stabilization_iterations: 0,
         // Feet stand by true Coulomb friction at each contact point; the default lumps four points into one.
         friction_model: FrictionModel::Coulomb,
         // The ground is a half space: nothing can tunnel through it.

@@ -1,1 +1,177 @@
+use super::*;
+use crate::skeleton::Skeleton;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+fn humanoid() -> Character {
+    let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
+    Character::new(&skeleton).expect("the built-in humanoid can be simulated")
+}
+
+/// All links in the rest pose, the root at height `z`.
+fn standing(character: &Character, z: f32) -> Vec<LinkState> {
+    let mut states: Vec<LinkState> = Vec::new();
+    for link in &character.links {
+        let pose = match link.parent {
+            None => Isometry3::from_parts(Translation3::new(0.0, 0.0, z), UnitQuaternion::identity()),
+            Some(p) => states[p].pose * link.rest.cast(),
+        };
+        states.push(LinkState { pose, linear: Vector3::zeros(), angular: Vector3::zeros() });
+    }
+    states
+}
+
+/// Linear momentum, and angular momentum about the centre of mass.
+fn momenta(character: &Character, states: &[LinkState]) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+    let (mut mass, mut com, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
+    let mut parts = Vec::new();
+    for (link, state) in character.links.iter().zip(states) {
+        let pose = state.pose.cast::<f64>();
+        let (v, w) = (state.linear.cast::<f64>(), state.angular.cast::<f64>());
+        let arm = pose.rotation * link.com;
+        let at = pose.translation.vector + arm;
+        let velocity = v + w.cross(&arm);
+        let spin = pose.rotation * (link.inertia * pose.rotation.inverse_transform_vector(&w));
+        mass += link.mass;
+        com += at * link.mass;
+        linear += velocity * link.mass;
+        parts.push((link.mass, at, velocity, spin));
+    }
+    com /= mass;
+    let drift = linear / mass;
+    let about = parts.iter().map(|(m, at, v, spin)| spin + (at - com).cross(&(v - drift)) * *m).sum();
+    (linear, about, com)
+}
+
+/// Targets that swing every limb, different at every control step.
+fn swinging(character: &Character, step: usize) -> Vec<Target> {
+    let at = |i: usize| (step as f32 * 0.35 + i as f32).sin();
+    let targets = character.links.iter().enumerate().map(|(i, link)| match link.joint {
+        LinkJoint::Free => Target::Free,
+        LinkJoint::Ball { .. } => {
+            Target::Ball(UnitQuaternion::from_scaled_axis(Vector3::new(0.5 * at(i), 0.8 * at(i + 3), 0.3 * at(i + 5))))
+        }
+        LinkJoint::Hinge { .. } => Target::Hinge(0.8 + 0.6 * at(i)),
+    });
+    targets.collect()
+}
+
+#[test]
+fn in_flight_gravity_alone_changes_momentum_while_limbs_move() {
+    let character = humanoid();
+    let mut world = World::new(&character, Settings::default());
+    let mut states = standing(&character, 50.0);
+    // A somersault about an axis that is no principal one, about the centre of mass.
+    let spin = Vector3::new(1.0, 4.0, 0.5);
+    let (_, _, com) = momenta(&character, &states);
+    for state in &mut states {
+        state.angular = spin;
+        state.linear = spin.cross(&(state.pose.translation.vector - com.cast())) + Vector3::new(1.0, -0.5, 5.0);
+    }
+    world.reset(&states);
+    let mass: f64 = character.links.iter().map(|l| l.mass).sum();
+    let (p0, l0, _) = momenta(&character, world.states());
+    let steps = 30;
+    let mut moved: f32 = 0.0;
+    for step in 0..steps {
+        world.set_targets(&swinging(&character, step));
+        world.step().expect("free flight stays finite");
+        let (a, b) = (&world.states()[0], &world.states()[1]);
+        moved = moved.max(a.pose.rotation.angle_to(&b.pose.rotation));
+        let t = (step + 1) as f64 / 30.0;
+        let (p, l, _) = momenta(&character, world.states());
+        let expected = p0 + Vector3::new(0.0, 0.0, -9.81 * mass * t);
+        assert!((p - expected).norm() < 1e-3 * p0.norm(), "linear momentum {p:?}, not {expected:?}, after {t} s");
+        assert!((l - l0).norm() < 0.01 * l0.norm(), "angular momentum {l:?}, not {l0:?}, after {t} s");
+    }
+    assert!(moved > 0.5, "the limbs hardly moved: {moved} rad");
+}
+
+#[test]
+fn a_reset_world_gives_the_bits_of_a_new_one() {
+    let character = humanoid();
+    let states = standing(&character, 0.875);
+    let play = |world: &mut World| -> Vec<LinkState> {
+        world.reset(&states);
+        for step in 0..40 {
+            world.set_targets(&swinging(&character, step));
+            world.step().expect("a falling humanoid stays finite");
+        }
+        world.states().to_vec()
+    };
+    let mut fresh = World::new(&character, Settings::default());
+    let first = play(&mut fresh);
+    let mut used = World::new(&character, Settings::default());
+    used.reset(&standing(&character, 0.7));
+    for step in 0..90 {
+        used.set_targets(&swinging(&character, step * 7));
+        used.step().expect("a falling humanoid stays finite");
+    }
+    assert_eq!(first, play(&mut used), "the reset remembers something");
+    assert_eq!(first, play(&mut used), "the second reset differs from the first");
+}
+
+#[test]
+fn a_held_pose_stands_on_the_ground() {
+    let character = humanoid();
+    let mut world = World::new(&character, Settings::default());
+    let states = standing(&character, 0.8815);
+    world.reset(&states);
+    let hold: Vec<Target> =
+        character.links.iter().map(|l| super::world::target_of(&l.joint, UnitQuaternion::identity())).collect();
+    world.set_targets(&hold);
+    for _ in 0..10 {
+        world.step().expect("standing stays finite");
+    }
+    let root = world.states()[0].pose.translation.vector;
+    assert!((root.z - 0.8815).abs() < 0.01, "the root sank or rose to {}", root.z);
+    let standing: Vec<&str> = character
+        .links
+        .iter()
+        .zip(world.contacts())
+        .filter_map(|(l, c)| c.then_some(l.name.as_str()))
+        .collect();
+    assert_eq!(standing, ["right_foot", "left_foot"]);
+}
+
+#[test]
+fn starting_inside_the_ground_adds_no_energy() {
+    let character = humanoid();
+    for depth in [0.03, 0.08] {
+        let mut world = World::new(&character, Settings::default());
+        world.reset(&standing(&character, 0.8815 - depth));
+        let hold: Vec<Target> =
+            character.links.iter().map(|l| super::world::target_of(&l.joint, UnitQuaternion::identity())).collect();
+        world.set_targets(&hold);
+        let mut highest: f32 = 0.0;
+        for _ in 0..30 {
+            world.step().expect("standing stays finite");
+            highest = highest.max(world.states()[0].pose.translation.z);
+        }
+        assert!(highest < 0.8815 + 0.01, "{depth} m inside, and thrown up to {highest}");
+    }
+}
+
+#[test]
+fn a_ball_drive_reaches_a_large_rotation() {
+    let character = humanoid();
+    let mut world = World::new(&character, Settings::default());
+    world.reset(&standing(&character, 100.0));
+    let shoulder = character.links.iter().position(|l| l.name == "left_upper_arm").expect("a humanoid has arms");
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.9, -2.2, 0.6));
+    let mut targets: Vec<Target> =
+        character.links.iter().map(|l| super::world::target_of(&l.joint, UnitQuaternion::identity())).collect();
+    targets[shoulder] = Target::Ball(turn);
+    world.set_targets(&targets);
+    for _ in 0..60 {
+        world.step().expect("flight stays finite");
+    }
+    let parent = character.links[shoulder].parent.expect("an arm has a parent");
+    let (a, b) = (world.states()[parent].pose.rotation, world.states()[shoulder].pose.rotation);
+    let reached = character.joint_rotation(shoulder, a, b);
+    assert!(reached.angle_to(&turn) < 0.02, "off by {} rad", reached.angle_to(&turn));
+}
+
+#[test]
+fn settings_say_the_physics_rate() {
+    assert!((Settings::default().physics_hz() - 240.0).abs() < 1e-12);
+}

@@ -1,0 +1,160 @@
+//! The reference motion as link states, at any time.
+
+use super::dynamics::{Dynamics, Masses};
+use super::setting::{Stage, TaskError};
+use crate::clip::LoopMode;
+use crate::motion::Motion;
+use crate::sim::LinkState;
+use crate::skeleton::Skeleton;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+/// The reference at one time.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// One per link.
+    pub links: Vec<LinkState>,
+    pub dynamics: Dynamics,
+    /// One per contact body of the motion.
+    pub contacts: Vec<bool>,
+    /// 0 at the first frame of a cycle, 1 at its last.
+    pub phase: f32,
+}
+
+/// A motion ready to be imitated.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    pub name: String,
+    fps: f64,
+    loop_mode: LoopMode,
+    duration: f64,
+    /// Link states, frame after frame.
+    frames: Vec<Vec<LinkState>>,
+    contacts: Vec<Vec<bool>>,
+    /// World from cycle number n, as many as an episode can see.
+    cycles: Vec<Isometry3<f32>>,
+    masses: Masses,
+    /// Links that the motion puts on the ground.
+    pub contact_links: Vec<usize>,
+}
+
+impl Reference {
+    /// `horizon` is the latest time that will be asked for, in seconds.
+    ///
+    /// # Errors
+    /// A motion of another skeleton, or of a single frame.
+    pub fn new(motion: &Motion, stage: &Stage, horizon: f64) -> Result<Self, TaskError> {
+        let skeleton = &stage.skeleton;
+        if motion.skeleton_sha256 != skeleton.sha256 {
+            let (motion, skeleton) = (motion.skeleton_name.clone(), skeleton.name.clone());
+            return Err(TaskError::OtherSkeleton { motion, skeleton });
+        }
+        if motion.qpos.len() < 2 {
+            return Err(TaskError::TooShort { frames: motion.qpos.len() });
+        }
+        let duration = motion.duration();
+        let cycles = (horizon / duration).ceil() as i64 + 2;
+        Ok(Reference {
+            name: motion.name.clone(),
+            fps: motion.fps,
+            loop_mode: motion.loop_mode,
+            duration,
+            frames: (0..motion.qpos.len()).map(|f| link_states(motion, skeleton, stage, f)).collect(),
+            contacts: motion.tracks.contact.clone(),
+            cycles: (0..cycles).map(|n| motion.cycle_offset(n).cast()).collect(),
+            masses: Masses::new(&stage.character),
+            contact_links: motion.contact_bodies.iter().map(|&b| stage.character.bodies[b].0).collect(),
+        })
+    }
+
+    /// Seconds of one cycle.
+    pub fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    pub fn loop_mode(&self) -> LoopMode {
+        self.loop_mode
+    }
+
+    /// Whether the motion has nothing more to show at `time`.
+    pub fn is_over(&self, time: f64) -> bool {
+        self.loop_mode == LoopMode::Clamp && time >= self.duration - 1e-9
+    }
+
+    pub(crate) fn masses(&self) -> &Masses {
+        &self.masses
+    }
+
+    /// An empty sample to write into.
+    pub fn blank(&self) -> Sample {
+        Sample {
+            links: self.frames[0].clone(),
+            dynamics: Dynamics::default(),
+            contacts: self.contacts[0].clone(),
+            phase: 0.0,
+        }
+    }
+
+    /// Writes the reference at `time` seconds into `sample`. A wrapping motion goes on cycle after cycle; an ending
+    /// one holds its last frame.
+    pub fn sample(&self, time: f64, sample: &mut Sample) {
+        let (cycle, within) = self.split(time);
+        let at = within * self.fps;
+        let last = self.frames.len() - 1;
+        let frame = (at.floor() as usize).min(last - 1);
+        let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
+        let offset = self.cycles[cycle.min(self.cycles.len() - 1)];
+        for (link, (a, b)) in sample.links.iter_mut().zip(self.frames[frame].iter().zip(&self.frames[frame + 1])) {
+            *link = moved(&between(a, b, blend), &offset);
+        }
+        sample.dynamics = self.masses.dynamics(&sample.links);
+        let nearest = if blend < 0.5 { frame } else { frame + 1 };
+        sample.contacts.copy_from_slice(&self.contacts[nearest]);
+        sample.phase = (within / self.duration) as f32;
+    }
+
+    fn split(&self, time: f64) -> (usize, f64) {
+        match self.loop_mode {
+            LoopMode::Clamp => (0, time.clamp(0.0, self.duration)),
+            LoopMode::Wrap => {
+                let cycle = (time / self.duration).floor().max(0.0);
+                (cycle as usize, (time - cycle * self.duration).clamp(0.0, self.duration))
+            }
+        }
+    }
+}
+
+fn link_states(motion: &Motion, skeleton: &Skeleton, stage: &Stage, frame: usize) -> Vec<LinkState> {
+    let twists = skeleton.twists(&motion.qpos[frame], &motion.qvel[frame]);
+    let poses = &motion.bodies[frame];
+    stage
+        .character
+        .links
+        .iter()
+        .map(|link| LinkState {
+            pose: poses[link.body].cast(),
+            linear: twists[link.body].linear.cast(),
+            angular: twists[link.body].angular.cast(),
+        })
+        .collect()
+}
+
+fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {
+    let at = a.pose.translation.vector.lerp(&b.pose.translation.vector, blend);
+    let (qa, qb) = (a.pose.rotation.coords, b.pose.rotation.coords);
+    let near = if qa.dot(&qb) < 0.0 { -qb } else { qb };
+    // Frames are close: the normalised mean differs from slerp by less than single precision shows.
+    let turn = UnitQuaternion::new_normalize(nalgebra::Quaternion::from(qa.lerp(&near, blend)));
+    LinkState {
+        pose: Isometry3::from_parts(Translation3::from(at), turn),
+        linear: a.linear.lerp(&b.linear, blend),
+        angular: a.angular.lerp(&b.angular, blend),
+    }
+}
+
+fn moved(state: &LinkState, offset: &Isometry3<f32>) -> LinkState {
+    LinkState {
+        pose: offset * state.pose,
+        linear: offset.rotation * state.linear,
+        angular: offset.rotation * state.angular,
+    }
+}

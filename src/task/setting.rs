@@ -1,0 +1,123 @@
+//! What a task can be told, and the stage on which it plays.
+
+use crate::humanoid::Slot;
+use crate::sim::{Character, Settings, SimError};
+use crate::skeleton::Skeleton;
+use serde::{Deserialize, Serialize};
+
+/// What the network's output means.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum Actions {
+    /// Rotation added to the reference's own joint targets, `scale` radians for an output of one.
+    Residual { scale: f32 },
+    /// Exponential-map target itself: the middle of each coordinate's range for zero, its ends times `reach` for ±1.
+    Absolute { reach: f32 },
+}
+
+/// Weights of the reward terms; their sum is the largest reward of a step. See [`super::Terms`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Rewards {
+    pub pose: f32,
+    pub velocity: f32,
+    pub position: f32,
+    pub root: f32,
+    pub root_velocity: f32,
+    pub com: f32,
+    pub angular_momentum: f32,
+}
+
+impl Default for Rewards {
+    fn default() -> Self {
+        Self {
+            pose: 0.3,
+            velocity: 0.1,
+            position: 0.25,
+            root: 0.15,
+            root_velocity: 0.1,
+            com: 0.05,
+            angular_momentum: 0.05,
+        }
+    }
+}
+
+/// When an episode fails.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Terminations {
+    /// A body further than this from its reference, metres.
+    pub distance: f32,
+    /// A body that the reference never puts on the ground touches it.
+    pub fall: bool,
+    /// Reward of a step below this, as in the paper; `None` leaves the rule out.
+    pub reward: Option<f32>,
+}
+
+impl Default for Terminations {
+    fn default() -> Self {
+        Self { distance: 0.5, fall: true, reward: None }
+    }
+}
+
+/// Everything that a task can be told.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Setting {
+    pub physics: Settings,
+    pub actions: Actions,
+    pub rewards: Rewards,
+    pub terminations: Terminations,
+    /// Start at any phase (reference state initialisation), not only at the first frame.
+    pub start_anywhere: bool,
+    /// Longest episode in training, seconds.
+    pub episode_s: f64,
+}
+
+impl Default for Setting {
+    fn default() -> Self {
+        Self {
+            physics: Settings::default(),
+            actions: Actions::Residual { scale: 0.3 },
+            rewards: Rewards::default(),
+            terminations: Terminations::default(),
+            start_anywhere: true,
+            episode_s: 10.0,
+        }
+    }
+}
+
+/// Why a task can't be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum TaskError {
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    #[error("the motion is made for skeleton `{motion}`, not for `{skeleton}`: retarget it again")]
+    OtherSkeleton { motion: String, skeleton: String },
+    #[error("the motion has {frames} frame(s), and imitation needs at least two")]
+    TooShort { frames: usize },
+}
+
+/// What every environment of a run shares: skeleton, character and the bodies of interest.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub skeleton: Skeleton,
+    pub character: Character,
+    /// Bodies whose positions the observation holds: head, hands and feet where the skeleton has them.
+    pub key_bodies: Vec<usize>,
+    /// What divides angular momentum: mass × leg length × √(g × leg length), kg·m²/s.
+    pub momentum_scale: f32,
+}
+
+impl Stage {
+    /// # Errors
+    /// A skeleton that can't be simulated.
+    pub fn new(skeleton: Skeleton) -> Result<Self, TaskError> {
+        let character = Character::new(&skeleton)?;
+        let ends = [Slot::Head, Slot::LeftHand, Slot::RightHand, Slot::LeftFoot, Slot::RightFoot];
+        let key_bodies = ends.iter().filter_map(|slot| skeleton.slots.get(slot).copied()).collect();
+        let leg = skeleton.leg_length();
+        let momentum_scale = (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32;
+        Ok(Stage { skeleton, character, key_bodies, momentum_scale })
+    }
+}
