@@ -5,12 +5,15 @@
 //! world and angular in the body's own frame; a ball joint is a quaternion, its velocity in the child's frame;
 //! several hinges on one body turn it one after the other.
 
+mod coordinates;
 mod drive;
 mod error;
 mod guard;
 mod inertia;
 mod kinematics;
 mod load;
+mod measure;
+mod rotations;
 mod shape;
 mod slots;
 
