@@ -1,5 +1,12 @@
 //! A clip: a tree of joints and their sampled rigid local transforms, in canonical space.
 
+mod error;
+mod file;
+mod sampling;
+
+pub use error::Error;
+pub(crate) use sampling::{Grid, MOST_TRANSFORMS, slerp};
+
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 

@@ -1,3 +1,322 @@
 //! Bytes of an animation file become a [`Clip`](crate::clip::Clip).
+//!
+//! A reader per format turns bytes into a [`scene::Scene`]; everything after that is common: the choice of take
+//! and joints, canonical axes and metres, rigid transforms, sampling, loop detection.
 
+mod axes;
+mod canonical;
+mod deepmimic;
+mod detect;
+mod error;
+mod facing;
+mod rigid;
 mod scene;
+mod seam;
+mod take;
+mod tree;
+
+pub use axes::{UnknownAxis, UpAxis};
+pub use deepmimic::DeepMimicError;
+pub use error::Error;
+
+use crate::clip::{Clip, Grid, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity, Source};
+use canonical::Rig;
+use detect::Format;
+use rigid::Frame;
+use scene::{Scene, Take};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// Largest animation file that is read, in bytes.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// How a file is to be read, where it shouldn't decide itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Name of the take, or its number counted from 1; the take with most motion if left out.
+    pub take: Option<String>,
+    /// Frames per second to sample at; the take's own if left out.
+    pub fps: Option<f64>,
+    /// Part of the take to keep, in seconds from its start.
+    pub trim: Option<(f64, f64)>,
+    /// Whether it loops; found out if left out.
+    pub loop_mode: Option<LoopMode>,
+    /// Up axis of the file's data, where its header is wrong.
+    pub up: Option<UpAxis>,
+    /// Metres per unit of the file's data, where its header is wrong.
+    pub unit_m: Option<f64>,
+}
+
+/// One take of a file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TakeInfo {
+    pub name: String,
+    /// Frames per second, Hz.
+    pub fps: f64,
+    pub frames: usize,
+    pub duration_s: f64,
+}
+
+/// What is in a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inspection {
+    /// `fbx`, `gltf` or `deepmimic`.
+    pub format: String,
+    pub takes: Vec<TakeInfo>,
+    /// Place in `takes` of the one that is loaded when none is named.
+    pub default_take: Option<usize>,
+    /// The joints with their rest pose, in canonical space.
+    pub joints: Vec<Joint>,
+    pub up_axis: String,
+    /// Metres per unit of the file.
+    pub unit_m: f64,
+    pub problems: Vec<Problem>,
+}
+
+/// Looks at the file `path`.
+pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, Error> {
+    let path = path.as_ref();
+    let file = file_name(path);
+    let bytes = bytes_of(path, &file)?;
+    let scene = open(&bytes, &file, path.parent())?;
+    inspection(scene.as_ref(), &file)
+}
+
+/// Reads a take of the file `path`.
+pub fn load(path: impl AsRef<Path>, options: &Options) -> Result<Clip, Error> {
+    let path = path.as_ref();
+    let file = file_name(path);
+    read(&bytes_of(path, &file)?, &file, path.parent(), options)
+}
+
+/// Reads a take from a file's bytes. `file` names it; external buffers of a `.gltf` are taken from `folder` and
+/// nowhere else, and without a folder they are missing.
+pub fn read(
+    bytes: &[u8],
+    file: &str,
+    folder: Option<&Path>,
+    options: &Options,
+) -> Result<Clip, Error> {
+    let scene = open(bytes, file, folder)?;
+    let (take, note) = take::choose(scene.as_ref(), file, options.take.as_deref())?;
+    let mut clip = clip(scene.as_ref(), file, take, options)?;
+    clip.source.sha256 = Sha256::digest(bytes)
+        .iter()
+        .map(|b| format!("{b:02x}"))
+        .collect();
+    clip.problems.extend(note);
+    Ok(clip)
+}
+
+/// The reader of each format.
+fn open(bytes: &[u8], file: &str, _folder: Option<&Path>) -> Result<Box<dyn Scene>, Error> {
+    let format = detect::detect(bytes).map_err(|reason| Error::Unsupported {
+        file: file.to_owned(),
+        reason,
+    })?;
+    match format {
+        Format::DeepMimic => deepmimic::read(bytes, stem(file))
+            .map(|scene| Box::new(scene) as Box<dyn Scene>)
+            .map_err(|source| Error::DeepMimic {
+                file: file.to_owned(),
+                source,
+            }),
+        Format::Glb | Format::Gltf | Format::Fbx => Err(Error::Unsupported {
+            file: file.to_owned(),
+            reason: "a format without a reader".to_owned(),
+        }),
+    }
+}
+
+fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
+    let default_take = (!scene.takes().is_empty()).then(|| take::most_motion(scene));
+    let first = default_take.map(|take| (take, scene.takes()[take].start));
+    let rig = Rig::new(scene, file, frame(scene, file, &Options::default())?, first)?;
+    let mut problems = scene.problems().to_vec();
+    problems.extend(rig.problems);
+    if default_take.is_none() {
+        problems.push(Problem {
+            id: "no-takes".to_owned(),
+            severity: Severity::Error,
+            message: "the file holds no animation; export it with at least one take".to_owned(),
+        });
+    }
+    Ok(Inspection {
+        format: scene.format().to_owned(),
+        takes: scene.takes().iter().map(take_info).collect(),
+        default_take,
+        joints: rig.joints,
+        up_axis: scene.up_axis().to_owned(),
+        unit_m: scene.unit_m(),
+        problems,
+    })
+}
+
+fn take_info(take: &Take) -> TakeInfo {
+    let duration_s = take.end - take.start;
+    TakeInfo {
+        name: take.name.clone(),
+        fps: take.fps,
+        frames: (duration_s * take.fps).round() as usize + 1,
+        duration_s,
+    }
+}
+
+fn frame(scene: &dyn Scene, file: &str, options: &Options) -> Result<Frame, Error> {
+    let unit_m = options.unit_m.unwrap_or_else(|| scene.unit_m());
+    if !(unit_m > 0.0 && unit_m.is_finite()) {
+        return Err(Error::Unit {
+            file: file.to_owned(),
+            unit_m,
+        });
+    }
+    let axes = match options.up {
+        Some(up) if up.to_string() != scene.up_axis() => up.canonical_from_file(),
+        _ => scene.canonical_from_file(),
+    };
+    Ok(Frame { axes, unit_m })
+}
+
+fn clip(scene: &dyn Scene, file: &str, take: usize, options: &Options) -> Result<Clip, Error> {
+    let about = &scene.takes()[take];
+    let (start, end) = span(about, file, options.trim)?;
+    let rig = Rig::new(
+        scene,
+        file,
+        frame(scene, file, options)?,
+        Some((take, start)),
+    )?;
+    let fps = options.fps.unwrap_or(about.fps);
+    let grid = grid(scene, file, about, end - start, fps)?;
+    let world = rig.frames(take, start, &grid)?;
+    let mut problems = scene.problems().to_vec();
+    problems.extend(sampling_problems(&grid, fps, &world));
+    let wraps = match options.loop_mode {
+        Some(mode) => mode == LoopMode::Wrap,
+        None => about
+            .wraps
+            .filter(|_| options.trim.is_none())
+            .unwrap_or_else(|| seam::wraps(&world)),
+    };
+    let frames = world.iter().map(|frame| rig.locals(frame)).collect();
+    problems.extend(rig.problems);
+    Ok(Clip {
+        name: stem(file).to_owned(),
+        fps: grid.fps,
+        loop_mode: if wraps {
+            LoopMode::Wrap
+        } else {
+            LoopMode::Clamp
+        },
+        joints: rig.joints,
+        frames,
+        source: Source {
+            file: file.to_owned(),
+            sha256: String::new(),
+            format: scene.format().to_owned(),
+            take: about.name.clone(),
+            fps: about.fps,
+            up_axis: options
+                .up
+                .map_or_else(|| scene.up_axis().to_owned(), |up| up.to_string()),
+            unit_m: options.unit_m.unwrap_or_else(|| scene.unit_m()),
+        },
+        problems,
+    })
+}
+
+/// Start and end, in the take's own seconds, of the part to keep.
+fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<(f64, f64), Error> {
+    let Some((from, to)) = trim else {
+        return Ok((take.start, take.end));
+    };
+    let duration = take.end - take.start;
+    let (start, end) = (from.max(0.0), to.min(duration));
+    if !(from <= to && start <= end) {
+        return Err(Error::EmptyTrim {
+            file: file.to_owned(),
+            take: take.name.clone(),
+            from,
+            to,
+            duration,
+        });
+    }
+    Ok((take.start + start, take.start + end))
+}
+
+fn grid(
+    scene: &dyn Scene,
+    file: &str,
+    take: &Take,
+    duration: f64,
+    fps: f64,
+) -> Result<Grid, Error> {
+    let nodes = scene.nodes().len();
+    let Some(one) = Grid::new(0.0, fps, 2) else {
+        return Err(Error::Rate {
+            file: file.to_owned(),
+            fps,
+        });
+    };
+    Grid::new(duration, one.fps, MOST_TRANSFORMS / nodes.max(1)).ok_or_else(|| Error::TooLong {
+        file: file.to_owned(),
+        take: take.name.clone(),
+        frames: (duration * fps).round() + 1.0,
+        nodes,
+    })
+}
+
+fn sampling_problems(
+    grid: &Grid,
+    fps: f64,
+    world: &[Vec<nalgebra::Isometry3<f64>>],
+) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    if grid.fps != fps {
+        problems.push(Problem {
+            id: "rate-adjusted".to_owned(),
+            severity: Severity::Note,
+            message: format!(
+                "sampled at {:.3} Hz, not {fps} Hz, so that a frame falls on the end",
+                grid.fps
+            ),
+        });
+    }
+    if world.windows(2).all(|w| w[0] == w[1]) {
+        problems.push(Problem {
+            id: "still-take".to_owned(),
+            severity: Severity::Warning,
+            message: "nothing moves in this take; choose another with --take".to_owned(),
+        });
+    }
+    problems
+}
+
+fn bytes_of(path: &Path, file: &str) -> Result<Vec<u8>, Error> {
+    let io = |source| Error::Io {
+        file: file.to_owned(),
+        source,
+    };
+    let size = std::fs::metadata(path).map_err(io)?.len();
+    if size > MOST_BYTES {
+        return Err(Error::TooLarge {
+            file: file.to_owned(),
+            size,
+            limit: MOST_BYTES,
+        });
+    }
+    std::fs::read(path).map_err(io)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn stem(file: &str) -> &str {
+    file.rsplit_once('.')
+        .map_or(file, |(stem, _)| if stem.is_empty() { file } else { stem })
+}

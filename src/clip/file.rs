@@ -1,0 +1,309 @@
+//! `NAME.clip`: a safetensors file with the tensors of a [`Clip`] and its other fields as JSON metadata.
+//!
+//! Tensors, for J joints and F frames: `parent` i32 \[J\] (−1 for a root), `rest_translation` f32 \[J, 3\],
+//! `rest_rotation` f32 \[J, 4\], `local_translation` f32 \[F, J, 3\], `local_rotation` f32 \[F, J, 4\]. Metres, and
+//! quaternions w, x, y, z. The metadata key `mimic` holds the JSON object [`Header`].
+
+use super::sampling::{MOST_FPS, MOST_TRANSFORMS};
+use super::{Clip, Error, Joint, LoopMode, Problem, Source};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::io::Write;
+use std::path::Path;
+
+const FORMAT: &str = "clip";
+const VERSION: u32 = 1;
+const KEY: &str = "mimic";
+/// Largest clip file that is read, in bytes.
+const MOST_BYTES: u64 = 4 << 30;
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: String,
+    version: u32,
+    name: String,
+    fps: f64,
+    joints: Vec<String>,
+    #[serde(rename = "loop")]
+    loop_mode: LoopMode,
+    source: Source,
+    problems: Vec<Problem>,
+}
+
+/// What every version of the header has, read first so that a later version is named and not called broken.
+#[derive(Deserialize)]
+struct Stamp {
+    format: String,
+    version: u32,
+}
+
+impl Clip {
+    /// Writes the clip file `path`, or leaves what was there untouched.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        let io = |source| Error::Io {
+            path: path.to_owned(),
+            source,
+        };
+        let bytes = self.to_bytes().map_err(|e| Error::broken(path, e))?;
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        let mut file = temporary_in(folder.unwrap_or(Path::new("."))).map_err(io)?;
+        file.write_all(&bytes)
+            .and_then(|()| file.as_file().sync_all())
+            .map_err(io)?;
+        file.persist(path).map_err(|e| io(e.error))?;
+        Ok(())
+    }
+
+    /// Reads the clip file `path`.
+    pub fn load(path: impl AsRef<Path>) -> Result<Clip, Error> {
+        let path = path.as_ref();
+        let io = |source| Error::Io {
+            path: path.to_owned(),
+            source,
+        };
+        let size = std::fs::metadata(path).map_err(io)?.len();
+        if size > MOST_BYTES {
+            return Err(Error::broken(
+                path,
+                format!("{size} bytes are more than {MOST_BYTES}"),
+            ));
+        }
+        let bytes = std::fs::read(path).map_err(io)?;
+        Clip::from_bytes(&bytes).map_err(|e| Error::broken(path, e))
+    }
+
+    /// The bytes of the clip's file.
+    fn to_bytes(&self) -> Result<Vec<u8>, String> {
+        let header = Header {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            name: self.name.clone(),
+            fps: self.fps,
+            joints: self.joints.iter().map(|joint| joint.name.clone()).collect(),
+            loop_mode: self.loop_mode,
+            source: self.source.clone(),
+            problems: self.problems.clone(),
+        };
+        let header = serde_json::to_string(&header).map_err(|e| e.to_string())?;
+        let (f, j) = (self.frames.len(), self.joints.len());
+        let rest = || self.joints.iter().map(|joint| &joint.rest);
+        let local = || self.frames.iter().flatten();
+        let tensors = [
+            ("parent", Dtype::I32, vec![j], parents(&self.joints)?),
+            (
+                "rest_translation",
+                Dtype::F32,
+                vec![j, 3],
+                translations(rest()),
+            ),
+            ("rest_rotation", Dtype::F32, vec![j, 4], rotations(rest())),
+            (
+                "local_translation",
+                Dtype::F32,
+                vec![f, j, 3],
+                translations(local()),
+            ),
+            (
+                "local_rotation",
+                Dtype::F32,
+                vec![f, j, 4],
+                rotations(local()),
+            ),
+        ];
+        let mut views = Vec::new();
+        for (name, dtype, shape, bytes) in &tensors {
+            let view = TensorView::new(*dtype, shape.clone(), bytes).map_err(|e| e.to_string())?;
+            views.push((*name, view));
+        }
+        let metadata = HashMap::from([(KEY.to_owned(), header)]);
+        safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
+    }
+
+    /// The clip that a file's bytes hold, or what is wrong with them.
+    fn from_bytes(bytes: &[u8]) -> Result<Clip, String> {
+        let tensors =
+            SafeTensors::deserialize(bytes).map_err(|e| format!("not safetensors ({e})"))?;
+        let header = header(bytes)?;
+        let j = header.joints.len();
+        let parent = values::<4>(&tensors, "parent", Dtype::I32, &[Some(j)])?;
+        let shape = [None, Some(j), Some(3)];
+        let translation = floats(&tensors, "local_translation", &shape)?;
+        let f = translation.len() / (3 * j);
+        if f == 0 || f.saturating_mul(j) > MOST_TRANSFORMS {
+            return Err(format!("{f} frames of {j} joints"));
+        }
+        let rotation = floats(&tensors, "local_rotation", &[Some(f), Some(j), Some(4)])?;
+        let rest_translation = floats(&tensors, "rest_translation", &[Some(j), Some(3)])?;
+        let rest_rotation = floats(&tensors, "rest_rotation", &[Some(j), Some(4)])?;
+        let rest = isometries("rest_rotation", &rest_translation, &rest_rotation)?;
+        let local = isometries("local_rotation", &translation, &rotation)?;
+        let parent: Vec<i32> = parent.into_iter().map(i32::from_le_bytes).collect();
+        Ok(Clip {
+            name: header.name,
+            fps: header.fps,
+            loop_mode: header.loop_mode,
+            joints: joints(header.joints, &parent, rest)?,
+            frames: local.chunks_exact(j).map(<[_]>::to_vec).collect(),
+            source: header.source,
+            problems: header.problems,
+        })
+    }
+}
+
+/// A temporary file that, once renamed, has the permissions of any new file.
+fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".clip-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+fn header(bytes: &[u8]) -> Result<Header, String> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
+    let text = metadata.metadata().as_ref().and_then(|m| m.get(KEY));
+    let text = text.ok_or_else(|| format!("no `{KEY}` in the metadata"))?;
+    let broken = |e: serde_json::Error| format!("metadata: {e}");
+    let stamp: Stamp = serde_json::from_str(text).map_err(broken)?;
+    if stamp.format != FORMAT {
+        return Err(format!("a `{}` file where a clip is wanted", stamp.format));
+    }
+    if stamp.version != VERSION {
+        return Err(format!(
+            "clip version {} where {VERSION} is the latest known",
+            stamp.version
+        ));
+    }
+    let header: Header = serde_json::from_str(text).map_err(broken)?;
+    if header.joints.is_empty() {
+        return Err("no joints".to_owned());
+    }
+    if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
+        return Err(format!("a rate of {} frames per second", header.fps));
+    }
+    Ok(header)
+}
+
+fn parents(joints: &[Joint]) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::with_capacity(4 * joints.len());
+    for joint in joints {
+        let parent = match joint.parent {
+            Some(p) => {
+                i32::try_from(p).map_err(|_| format!("too many joints for `{}`", joint.name))?
+            }
+            None => -1,
+        };
+        bytes.extend(parent.to_le_bytes());
+    }
+    Ok(bytes)
+}
+
+fn translations<'a>(transforms: impl Iterator<Item = &'a Isometry3<f64>>) -> Vec<u8> {
+    let numbers = transforms.flat_map(|t| [t.translation.x, t.translation.y, t.translation.z]);
+    numbers.flat_map(|x| (x as f32).to_le_bytes()).collect()
+}
+
+fn rotations<'a>(transforms: impl Iterator<Item = &'a Isometry3<f64>>) -> Vec<u8> {
+    let numbers = transforms.flat_map(|t| [t.rotation.w, t.rotation.i, t.rotation.j, t.rotation.k]);
+    numbers.flat_map(|x| (x as f32).to_le_bytes()).collect()
+}
+
+/// Elements of a tensor, after its type and shape are found to be those wanted (`None` is any length).
+fn values<const N: usize>(
+    tensors: &SafeTensors<'_>,
+    name: &str,
+    dtype: Dtype,
+    shape: &[Option<usize>],
+) -> Result<Vec<[u8; N]>, String> {
+    let tensor = tensors
+        .tensor(name)
+        .map_err(|_| format!("no tensor `{name}`"))?;
+    let found = tensor.shape();
+    let fits = found.len() == shape.len()
+        && found
+            .iter()
+            .zip(shape)
+            .all(|(have, want)| want.is_none_or(|want| *have == want));
+    if tensor.dtype() != dtype || !fits {
+        let want: Vec<String> = shape
+            .iter()
+            .map(|s| s.map_or("F".to_owned(), |s| s.to_string()))
+            .collect();
+        let want = want.join(", ");
+        return Err(format!(
+            "tensor `{name}` is {:?} {found:?} where {dtype:?} [{want}] is wanted",
+            tensor.dtype()
+        ));
+    }
+    Ok(tensor.data().as_chunks::<N>().0.to_vec())
+}
+
+fn floats(
+    tensors: &SafeTensors<'_>,
+    name: &str,
+    shape: &[Option<usize>],
+) -> Result<Vec<f64>, String> {
+    let bytes = values::<4>(tensors, name, Dtype::F32, shape)?;
+    let numbers: Vec<f64> = bytes
+        .into_iter()
+        .map(|b| f64::from(f32::from_le_bytes(b)))
+        .collect();
+    match numbers.iter().position(|x| !x.is_finite()) {
+        Some(at) => Err(format!(
+            "tensor `{name}`: element {at} is not a finite number"
+        )),
+        None => Ok(numbers),
+    }
+}
+
+fn isometries(
+    name: &str,
+    translation: &[f64],
+    rotation: &[f64],
+) -> Result<Vec<Isometry3<f64>>, String> {
+    let places = translation.as_chunks::<3>().0;
+    let turns = rotation.as_chunks::<4>().0;
+    let isometry = |(i, (t, q)): (usize, (&[f64; 3], &[f64; 4]))| {
+        let q = UnitQuaternion::try_new(Quaternion::new(q[0], q[1], q[2], q[3]), 1e-3);
+        let q = q.ok_or_else(|| format!("tensor `{name}`: rotation {i} is zero"))?;
+        Ok(Isometry3::from_parts(
+            Translation3::new(t[0], t[1], t[2]),
+            q,
+        ))
+    };
+    places.iter().zip(turns).enumerate().map(isometry).collect()
+}
+
+fn joints(
+    names: Vec<String>,
+    parents: &[i32],
+    rest: Vec<Isometry3<f64>>,
+) -> Result<Vec<Joint>, String> {
+    let joint = |(j, ((name, &parent), rest)): (usize, ((String, &i32), Isometry3<f64>))| {
+        let parent = match parent {
+            -1 => None,
+            p => match usize::try_from(p) {
+                Ok(p) if p < j => Some(p),
+                _ => {
+                    return Err(format!(
+                        "joint {j} `{name}` has parent {p}, which isn't before it"
+                    ));
+                }
+            },
+        };
+        Ok(Joint { name, parent, rest })
+    };
+    names
+        .into_iter()
+        .zip(parents)
+        .zip(rest)
+        .enumerate()
+        .map(joint)
+        .collect()
+}

@@ -1,0 +1,94 @@
+//! Which way is up in a file, and how its axes become Z up, X forward, Y left.
+
+use nalgebra::Matrix3;
+use std::fmt;
+use std::str::FromStr;
+
+/// The direction in a file's coordinates that points away from the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpAxis {
+    PlusX,
+    MinusX,
+    PlusY,
+    MinusY,
+    PlusZ,
+    MinusZ,
+}
+
+/// The text isn't one of the six axes.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown up axis `{0}`; give x, y or z, with - in front where it points down")]
+pub struct UnknownAxis(String);
+
+impl UpAxis {
+    const NAMES: [(UpAxis, &'static str); 6] = [
+        (UpAxis::PlusX, "+X"),
+        (UpAxis::MinusX, "-X"),
+        (UpAxis::PlusY, "+Y"),
+        (UpAxis::MinusY, "-Y"),
+        (UpAxis::PlusZ, "+Z"),
+        (UpAxis::MinusZ, "-Z"),
+    ];
+
+    /// Rotation from the file's axes to Z up, X forward, Y left, for a file of which only the up axis is known.
+    ///
+    /// Characters in Y-up files face +Z, those in Z-up files −Y, as the tools that write them have it. For the
+    /// other axes the turn is the shortest one from these; [`super::facing`] puts the heading right.
+    pub(crate) fn canonical_from_file(self) -> Matrix3<f64> {
+        match self {
+            UpAxis::PlusX => Matrix3::new(0., 1., 0., 0., 0., 1., 1., 0., 0.),
+            UpAxis::MinusX => Matrix3::new(0., -1., 0., 0., 0., 1., -1., 0., 0.),
+            UpAxis::PlusY => Matrix3::new(0., 0., 1., 1., 0., 0., 0., 1., 0.),
+            UpAxis::MinusY => Matrix3::new(0., 0., 1., -1., 0., 0., 0., -1., 0.),
+            UpAxis::PlusZ => Matrix3::new(0., -1., 0., 1., 0., 0., 0., 0., 1.),
+            UpAxis::MinusZ => Matrix3::new(0., -1., 0., -1., 0., 0., 0., 0., -1.),
+        }
+    }
+}
+
+impl fmt::Display for UpAxis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::NAMES.iter().find(|(axis, _)| axis == self);
+        f.write_str(named.map_or("", |(_, name)| name))
+    }
+}
+
+impl FromStr for UpAxis {
+    type Err = UnknownAxis;
+
+    fn from_str(text: &str) -> Result<Self, UnknownAxis> {
+        let wanted = text.trim().to_ascii_uppercase();
+        Self::NAMES
+            .iter()
+            .find(|(_, name)| *name == wanted || name.strip_prefix('+') == Some(wanted.as_str()))
+            .map(|(axis, _)| *axis)
+            .ok_or_else(|| UnknownAxis(text.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn every_axis_becomes_up_by_a_rotation() {
+        let up = [
+            Vector3::x(),
+            -Vector3::x(),
+            Vector3::y(),
+            -Vector3::y(),
+            Vector3::z(),
+            -Vector3::z(),
+        ];
+        for ((axis, name), up) in UpAxis::NAMES.iter().zip(up) {
+            let turn = axis.canonical_from_file();
+            assert_eq!(turn * up, Vector3::z(), "{name}");
+            assert_eq!(turn.determinant(), 1.0, "{name}");
+            assert_eq!(name.parse(), Ok(*axis));
+        }
+        assert_eq!("y".parse(), Ok(UpAxis::PlusY));
+        assert_eq!("-z".parse(), Ok(UpAxis::MinusZ));
+        assert!("w".parse::<UpAxis>().is_err());
+    }
+}

@@ -1,0 +1,315 @@
+//! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one fixed humanoid.
+
+use super::scene::{Node, Scene, Take};
+use crate::clip::{Problem, Severity, slerp};
+use nalgebra::{Matrix3, Matrix4, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// Numbers in one frame: duration, root position, root rotation, then the joints in the order of [`JOINTS`].
+const ROW: usize = 44;
+/// Numbers in one frame of the format's quadruped.
+const DOG_ROW: usize = 84;
+
+/// How a joint moves, and so how many numbers it has in a row.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Quaternion w, x, y, z.
+    Spherical,
+    /// Angle about the parent's Z axis: positive angles bend an elbow forward, negative ones a knee backward.
+    Revolute,
+    Fixed,
+}
+
+struct Definition {
+    name: &'static str,
+    parent: Option<usize>,
+    kind: Kind,
+    /// Place in the parent's frame, metres; Y up, X forward, Z to the right.
+    offset: [f64; 3],
+}
+
+const fn joint(name: &'static str, parent: usize, kind: Kind, offset: [f64; 3]) -> Definition {
+    Definition {
+        name,
+        parent: Some(parent),
+        kind,
+        offset,
+    }
+}
+
+/// The format's humanoid; the sizes are those of its character file.
+const JOINTS: [Definition; 15] = [
+    Definition {
+        name: "root",
+        parent: None,
+        kind: Kind::Spherical,
+        offset: [0.0; 3],
+    },
+    joint("chest", 0, Kind::Spherical, [0.0, 0.236151, 0.0]),
+    joint("neck", 1, Kind::Spherical, [0.0, 0.223894, 0.0]),
+    joint("right_hip", 0, Kind::Spherical, [0.0, 0.0, 0.084887]),
+    joint("right_knee", 3, Kind::Revolute, [0.0, -0.421546, 0.0]),
+    joint("right_ankle", 4, Kind::Spherical, [0.0, -0.409870, 0.0]),
+    joint(
+        "right_shoulder",
+        1,
+        Kind::Spherical,
+        [-0.02405, 0.24350, 0.18311],
+    ),
+    joint("right_elbow", 6, Kind::Revolute, [0.0, -0.274788, 0.0]),
+    joint("right_wrist", 7, Kind::Fixed, [0.0, -0.258947, 0.0]),
+    joint("left_hip", 0, Kind::Spherical, [0.0, 0.0, -0.084887]),
+    joint("left_knee", 9, Kind::Revolute, [0.0, -0.421546, 0.0]),
+    joint("left_ankle", 10, Kind::Spherical, [0.0, -0.409870, 0.0]),
+    joint(
+        "left_shoulder",
+        1,
+        Kind::Spherical,
+        [-0.02405, 0.24350, -0.18311],
+    ),
+    joint("left_elbow", 12, Kind::Revolute, [0.0, -0.274788, 0.0]),
+    joint("left_wrist", 13, Kind::Fixed, [0.0, -0.258947, 0.0]),
+];
+
+/// Why a DeepMimic file couldn't be read.
+#[derive(Debug, thiserror::Error)]
+pub enum DeepMimicError {
+    #[error("broken JSON ({0}); write the file again")]
+    Json(serde_json::Error),
+    #[error("no frames; write the file again")]
+    NoFrames,
+    #[error("frames of 84 numbers are a DeepMimic dog; only its humanoid (44 numbers) can be read")]
+    Dog,
+    #[error(
+        "frame {frame} has {found} numbers where a DeepMimic humanoid has 44; write the file again"
+    )]
+    Width { frame: usize, found: usize },
+    #[error("frame {frame} lasts {seconds} s; durations must be positive numbers")]
+    Duration { frame: usize, seconds: f64 },
+    #[error("frame {frame}, joint `{joint}`: the rotation is zero; repair the file")]
+    ZeroRotation { frame: usize, joint: &'static str },
+    #[error("frame {frame} holds a number too large to use; repair the file")]
+    Magnitude { frame: usize },
+}
+
+/// One frame: the root's place and every joint's rotation in its parent.
+struct Pose {
+    time: f64,
+    root: Vector3<f64>,
+    rotations: Vec<UnitQuaternion<f64>>,
+}
+
+#[derive(serde::Deserialize)]
+struct File {
+    #[serde(rename = "Loop")]
+    loops: Option<String>,
+    #[serde(rename = "Frames")]
+    frames: Vec<Vec<f64>>,
+}
+
+/// A DeepMimic motion on its humanoid.
+pub(crate) struct DeepMimicScene {
+    nodes: Vec<Node>,
+    takes: Vec<Take>,
+    poses: Vec<Pose>,
+    problems: Vec<Problem>,
+}
+
+/// Reads a motion file. `name` becomes the take's name, since the format has none.
+pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimicError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let file: File = serde_json::from_slice(bytes).map_err(DeepMimicError::Json)?;
+    let poses = poses(&file.frames)?;
+    let mut problems = Vec::new();
+    let wraps = loop_word(file.loops.as_deref(), &mut problems);
+    let end = poses.last().map_or(0.0, |pose| pose.time);
+    let take = Take {
+        name: name.to_owned(),
+        start: 0.0,
+        end,
+        fps: rate(&poses),
+        animated: (0..JOINTS.len())
+            .filter(|&j| JOINTS[j].kind != Kind::Fixed)
+            .collect(),
+        wraps,
+    };
+    Ok(DeepMimicScene {
+        nodes: nodes(),
+        takes: vec![take],
+        poses,
+        problems,
+    })
+}
+
+fn nodes() -> Vec<Node> {
+    let node = |d: &Definition| Node {
+        name: d.name.to_owned(),
+        parent: d.parent,
+        is_bone: true,
+        is_plain: true,
+    };
+    JOINTS.iter().map(node).collect()
+}
+
+fn loop_word(word: Option<&str>, problems: &mut Vec<Problem>) -> Option<bool> {
+    match word {
+        Some("wrap") => Some(true),
+        Some("none") => Some(false),
+        Some(other) => {
+            problems.push(Problem {
+                id: "unknown-loop-word".to_owned(),
+                severity: Severity::Warning,
+                message: format!(
+                    "`Loop` is `{other}`, neither wrap nor none; the motion itself decides"
+                ),
+            });
+            None
+        }
+        None => None,
+    }
+}
+
+fn poses(rows: &[Vec<f64>]) -> Result<Vec<Pose>, DeepMimicError> {
+    let mut poses = Vec::with_capacity(rows.len());
+    let mut time = 0.0;
+    for (frame, row) in rows.iter().enumerate() {
+        poses.push(pose(frame, row, time)?);
+        // The last frame's duration leads nowhere: the motion ends at that frame.
+        if frame + 1 < rows.len() {
+            if !(row[0] > 0.0 && row[0].is_finite()) {
+                return Err(DeepMimicError::Duration {
+                    frame,
+                    seconds: row[0],
+                });
+            }
+            time += row[0];
+        }
+    }
+    if poses.is_empty() {
+        return Err(DeepMimicError::NoFrames);
+    }
+    Ok(poses)
+}
+
+fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
+    match row.len() {
+        ROW => {}
+        DOG_ROW => return Err(DeepMimicError::Dog),
+        found => return Err(DeepMimicError::Width { frame, found }),
+    }
+    if !row.iter().all(|x| x.abs() < 1e9) {
+        return Err(DeepMimicError::Magnitude { frame });
+    }
+    let mut at = 4;
+    let mut rotations = Vec::with_capacity(JOINTS.len());
+    for definition in &JOINTS {
+        let (rotation, width) = match definition.kind {
+            Kind::Spherical => {
+                let q = Quaternion::new(row[at], row[at + 1], row[at + 2], row[at + 3]);
+                let rotation =
+                    UnitQuaternion::try_new(q, 1e-6).ok_or(DeepMimicError::ZeroRotation {
+                        frame,
+                        joint: definition.name,
+                    })?;
+                (rotation, 4)
+            }
+            Kind::Revolute => (
+                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), row[at]),
+                1,
+            ),
+            Kind::Fixed => (UnitQuaternion::identity(), 0),
+        };
+        rotations.push(rotation);
+        at += width;
+    }
+    Ok(Pose {
+        time,
+        root: Vector3::new(row[1], row[2], row[3]),
+        rotations,
+    })
+}
+
+/// Frames per second: by the median of the frames' durations, as a whole number where it is within 0.1 % of one
+/// (the files write 1/30 s as 0.033332).
+fn rate(poses: &[Pose]) -> f64 {
+    let mut gaps: Vec<f64> = poses.windows(2).map(|w| w[1].time - w[0].time).collect();
+    gaps.sort_by(f64::total_cmp);
+    let Some(&gap) = gaps.get(gaps.len() / 2) else {
+        return 30.0;
+    };
+    let rate = 1.0 / gap;
+    let whole = rate.round();
+    if (rate - whole).abs() < 1e-3 * whole {
+        whole
+    } else {
+        rate
+    }
+}
+
+impl DeepMimicScene {
+    /// Root position and joint rotations at `time`, between the two frames around it.
+    fn pose_at(&self, time: f64) -> (Vector3<f64>, Vec<UnitQuaternion<f64>>) {
+        let after = self.poses.partition_point(|pose| pose.time <= time);
+        let b = &self.poses[after.min(self.poses.len() - 1)];
+        let a = &self.poses[after.saturating_sub(1)];
+        let span = b.time - a.time;
+        let t = if span > 0.0 {
+            (time - a.time) / span
+        } else {
+            0.0
+        };
+        let rotations = a.rotations.iter().zip(&b.rotations);
+        (
+            a.root.lerp(&b.root, t),
+            rotations.map(|(a, b)| slerp(a, b, t)).collect(),
+        )
+    }
+}
+
+impl Scene for DeepMimicScene {
+    fn format(&self) -> &'static str {
+        "deepmimic"
+    }
+
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    fn takes(&self) -> &[Take] {
+        &self.takes
+    }
+
+    fn up_axis(&self) -> &str {
+        "+Y"
+    }
+
+    fn unit_m(&self) -> f64 {
+        1.0
+    }
+
+    fn canonical_from_file(&self) -> Matrix3<f64> {
+        Matrix3::new(1., 0., 0., 0., 0., -1., 0., 1., 0.)
+    }
+
+    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let (root, rotations) = match at {
+            Some((_, time)) => self.pose_at(time),
+            None => (
+                Vector3::zeros(),
+                vec![UnitQuaternion::identity(); JOINTS.len()],
+            ),
+        };
+        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(JOINTS.len());
+        for (definition, rotation) in JOINTS.iter().zip(&rotations) {
+            let parent = definition
+                .parent
+                .map_or(Translation3::from(root).to_homogeneous(), |p| world[p]);
+            let offset = Translation3::from(Vector3::from(definition.offset)).to_homogeneous();
+            world.push(parent * offset * rotation.to_homogeneous());
+        }
+        world
+    }
+
+    fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+}

@@ -1,0 +1,174 @@
+//! Whether a clip's end joins its beginning.
+
+use nalgebra::{Isometry3, Rotation2, Vector2, Vector3};
+
+/// Largest joint distance across the seam, relative to the skeleton's height: root mean square, and any joint.
+const SEAM_RMS: f64 = 0.02;
+const SEAM_MAX: f64 = 0.04;
+/// The seam may be this part of how far the pose changes in the clip. A clip that hardly moves would pass the
+/// limits above whatever it does.
+const SEAM_OF_RANGE: f64 = 0.2;
+/// Pose change, relative to height, below which a clip stands still and has nothing to repeat.
+const STILL: f64 = 0.002;
+/// Velocity across the seam may jump this much more than the median jump between frames within the clip …
+const JUMP_OF_MEDIAN: f64 = 4.0;
+/// … or by this part of the clip's root mean square speed.
+const JUMP_OF_SPEED: f64 = 0.25;
+/// Fewest frames in which a cycle can be seen.
+const FEWEST: usize = 5;
+
+type Places = Vec<Vector3<f64>>;
+
+/// Whether the clip with these world transforms wraps: its last frame is its first, moved over the ground.
+///
+/// Moving over the ground is a turn about Z and a horizontal shift, fitted to all joints; it stands for the root's
+/// heading frame without having to know which joint is the root (files put the travel on different ones). What
+/// is left must be small beside the skeleton and beside the motion itself, and velocities must run on across the
+/// seam: a pose that is passed twice in different directions doesn't close a cycle.
+pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
+    let frames = moving_places(world);
+    let [first, second, .., before, last] = frames.as_slice() else {
+        return false;
+    };
+    if frames.len() < FEWEST || first.is_empty() {
+        return false;
+    }
+    let height = world.first().map_or(0.0, |frame| extent(frame));
+    let carry = Carry::fit(first, last);
+    let gaps: Places = first
+        .iter()
+        .zip(last)
+        .map(|(a, b)| carry.place(a) - b)
+        .collect();
+    let range = frames
+        .iter()
+        .map(|frame| rms(&difference(first, frame)))
+        .fold(0.0, f64::max);
+    if range < STILL * height || rms(&gaps) > SEAM_OF_RANGE * pose_range(&frames) {
+        return false;
+    }
+    let widest = gaps.iter().map(Vector3::norm).fold(0.0, f64::max);
+    if rms(&gaps) > SEAM_RMS * height || widest > SEAM_MAX * height {
+        return false;
+    }
+    let onward: Places = difference(first, second)
+        .iter()
+        .map(|v| carry.turn(v))
+        .collect();
+    runs_on(&frames, &difference(&difference(before, last), &onward))
+}
+
+/// Whether the jump in velocity at the seam (metres per frame) is no more than the clip itself has.
+fn runs_on(frames: &[Places], jump: &Places) -> bool {
+    let steps: Vec<Places> = frames
+        .windows(2)
+        .map(|w| difference(&w[0], &w[1]))
+        .collect();
+    let mut jumps: Vec<f64> = steps
+        .windows(2)
+        .map(|w| rms(&difference(&w[0], &w[1])))
+        .collect();
+    jumps.sort_by(f64::total_cmp);
+    let median = jumps.get(jumps.len() / 2).copied().unwrap_or(0.0);
+    let square: f64 = steps.iter().map(|step| rms(step).powi(2)).sum();
+    let speed = (square / steps.len().max(1) as f64).sqrt();
+    rms(jump) <= (JUMP_OF_MEDIAN * median).max(JUMP_OF_SPEED * speed)
+}
+
+/// Places of the joints that move at all: a file's still armature nodes don't travel with the character.
+fn moving_places(world: &[Vec<Isometry3<f64>>]) -> Vec<Places> {
+    let Some(first) = world.first() else {
+        return Vec::new();
+    };
+    let least = 1e-4 * extent(first);
+    let moves = |j: usize| {
+        let distance = |frame: &Vec<Isometry3<f64>>| {
+            (frame[j].translation.vector - first[j].translation.vector).norm()
+        };
+        world.iter().any(|frame| distance(frame) > least)
+    };
+    let moving: Vec<usize> = (0..first.len()).filter(|&j| moves(j)).collect();
+    let places = |frame: &Vec<Isometry3<f64>>| {
+        moving
+            .iter()
+            .map(|&j| frame[j].translation.vector)
+            .collect()
+    };
+    world.iter().map(places).collect()
+}
+
+/// Longest side of the box around the joints, metres.
+fn extent(frame: &[Isometry3<f64>]) -> f64 {
+    let side = |axis: usize| {
+        let along = frame.iter().map(|joint| joint.translation.vector[axis]);
+        let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+        high - low
+    };
+    (0..3).map(side).fold(0.0, f64::max)
+}
+
+/// Farthest that the pose gets from the first one once travel is taken out.
+fn pose_range(frames: &[Places]) -> f64 {
+    let Some(first) = frames.first() else {
+        return 0.0;
+    };
+    let away = |frame: &Places| {
+        let carry = Carry::fit(first, frame);
+        let gaps: Places = first
+            .iter()
+            .zip(frame)
+            .map(|(a, b)| carry.place(a) - b)
+            .collect();
+        rms(&gaps)
+    };
+    frames.iter().map(away).fold(0.0, f64::max)
+}
+
+fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
+    a.iter().zip(b).map(|(a, b)| b - a).collect()
+}
+
+fn rms(vectors: &[Vector3<f64>]) -> f64 {
+    let square: f64 = vectors.iter().map(Vector3::norm_squared).sum();
+    (square / vectors.len().max(1) as f64).sqrt()
+}
+
+/// A move over the ground: a turn about Z around `from`, then a shift to `to`.
+struct Carry {
+    heading: Rotation2<f64>,
+    from: Vector2<f64>,
+    to: Vector2<f64>,
+}
+
+impl Carry {
+    /// The move that brings `a` nearest to `b` in the least-squares sense (planar Procrustes).
+    fn fit(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Self {
+        let (from, to) = (centre(a), centre(b));
+        let (mut cross, mut dot) = (0.0, 0.0);
+        for (a, b) in a.iter().zip(b) {
+            let (a, b) = (a.xy() - from, b.xy() - to);
+            cross += a.perp(&b);
+            dot += a.dot(&b);
+        }
+        Self {
+            heading: Rotation2::new(cross.atan2(dot)),
+            from,
+            to,
+        }
+    }
+
+    fn place(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        let flat = self.heading * (p.xy() - self.from) + self.to;
+        Vector3::new(flat.x, flat.y, p.z)
+    }
+
+    fn turn(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        let flat = self.heading * v.xy();
+        Vector3::new(flat.x, flat.y, v.z)
+    }
+}
+
+fn centre(places: &[Vector3<f64>]) -> Vector2<f64> {
+    let sum: Vector2<f64> = places.iter().map(|p| p.xy()).sum();
+    sum / places.len().max(1) as f64
+}

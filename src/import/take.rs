@@ -1,0 +1,144 @@
+//! Which take of a file is meant.
+
+use super::Error;
+use super::scene::Scene;
+use crate::clip::{Problem, Severity};
+use nalgebra::Matrix4;
+
+/// Times within a take at which its motion is looked at when it has to be compared with others.
+const LOOKS: usize = 9;
+
+/// The take called `wanted` (its name, its name in other letter case, its name behind a `|`, or its number
+/// counted from 1), or the one with most motion, with a note when there was a choice.
+pub(crate) fn choose(
+    scene: &dyn Scene,
+    file: &str,
+    wanted: Option<&str>,
+) -> Result<(usize, Option<Problem>), Error> {
+    if scene.takes().is_empty() {
+        return Err(Error::NoTakes {
+            file: file.to_owned(),
+        });
+    }
+    match wanted {
+        Some(wanted) => match find(scene, wanted) {
+            Some(take) => Ok((take, None)),
+            None => Err(Error::UnknownTake {
+                file: file.to_owned(),
+                wanted: wanted.to_owned(),
+                takes: list(scene),
+            }),
+        },
+        None => {
+            let take = most_motion(scene);
+            Ok((take, (scene.takes().len() > 1).then(|| note(scene, take))))
+        }
+    }
+}
+
+fn find(scene: &dyn Scene, wanted: &str) -> Option<usize> {
+    let same = |a: &str, b: &str| a.to_lowercase() == b.to_lowercase();
+    let only = |fits: &dyn Fn(&str) -> bool| {
+        let mut found = scene
+            .takes()
+            .iter()
+            .enumerate()
+            .filter(|(_, take)| fits(&take.name));
+        found
+            .next()
+            .filter(|_| found.next().is_none())
+            .map(|(at, _)| at)
+    };
+    let exact = scene.takes().iter().position(|take| take.name == wanted);
+    exact
+        .or_else(|| only(&|name| same(name, wanted)))
+        .or_else(|| {
+            only(&|name| {
+                name.rsplit('|')
+                    .next()
+                    .is_some_and(|last| same(last, wanted))
+            })
+        })
+        .or_else(|| {
+            let number: usize = wanted.parse().ok()?;
+            number.checked_sub(1).filter(|&at| at < scene.takes().len())
+        })
+}
+
+fn list(scene: &dyn Scene) -> String {
+    let takes = scene.takes().iter().enumerate();
+    let named: Vec<String> = takes
+        .map(|(at, take)| format!("{} `{}`", at + 1, take.name))
+        .collect();
+    named.join(", ")
+}
+
+/// The take in which most nodes move for longest; the first of equals.
+pub(crate) fn most_motion(scene: &dyn Scene) -> usize {
+    if scene.takes().len() == 1 {
+        return 0;
+    }
+    let amounts = (0..scene.takes().len()).map(|take| amount(scene, take));
+    let best = amounts.enumerate().fold((0, -1.0), |best, (take, amount)| {
+        if amount > best.1 {
+            (take, amount)
+        } else {
+            best
+        }
+    });
+    best.0
+}
+
+/// Animated nodes × seconds, nought for a take in which nothing changes place.
+fn amount(scene: &dyn Scene, take: usize) -> f64 {
+    let Some(about) = scene.takes().get(take) else {
+        return 0.0;
+    };
+    let span = about.end - about.start;
+    if about.animated.is_empty() || span <= 0.0 {
+        return 0.0;
+    }
+    let look = |k: usize| {
+        scene.world(Some((
+            take,
+            about.start + span * k as f64 / (LOOKS - 1) as f64,
+        )))
+    };
+    let first = look(0);
+    let size = first
+        .iter()
+        .map(|m| m.fixed_view::<3, 1>(0, 3).norm())
+        .fold(0.0, f64::max);
+    let moves = (1..LOOKS).any(|k| differ(&first, &look(k), 1e-6 * size.max(1e-9)));
+    if moves {
+        about.animated.len() as f64 * span
+    } else {
+        0.0
+    }
+}
+
+/// Whether some node is elsewhere, or turned.
+fn differ(a: &[Matrix4<f64>], b: &[Matrix4<f64>], shift: f64) -> bool {
+    let moved = |(a, b): (&Matrix4<f64>, &Matrix4<f64>)| {
+        let change = b - a;
+        let turned =
+            change.fixed_view::<3, 3>(0, 0).norm() > 1e-6 * a.fixed_view::<3, 3>(0, 0).norm();
+        turned || change.fixed_view::<3, 1>(0, 3).norm() > shift
+    };
+    a.iter().zip(b).any(moved)
+}
+
+fn note(scene: &dyn Scene, take: usize) -> Problem {
+    let name = scene
+        .takes()
+        .get(take)
+        .map_or("", |take| take.name.as_str());
+    Problem {
+        id: "several-takes".to_owned(),
+        severity: Severity::Note,
+        message: format!(
+            "took `{name}`, which has most motion, of {}; choose with --take",
+            list(scene)
+        ),
+    }
+}
