@@ -1,1 +1,69 @@
-//! To be built.
+//! How a policy is learned: networks over one flat parameter vector, proximal policy optimisation and its parts.
+//!
+//! Everything works on plain slices in row-major order (`[rows, columns]`, a row per sample) and is generic over
+//! [`Scalar`], so the code that trains in `f32` is the code whose gradients are checked in `f64`. Results carry the same
+//! bits at any number of threads: work is cut into a fixed number of pieces and sums are added in a fixed order.
+
+mod adam;
+//X mod checkpoint;
+mod gae;
+mod kernels;
+mod network;
+mod normalizer;
+mod policy;
+mod ppo;
+mod random;
+mod surrogate;
+mod value_scale;
+
+pub use adam::{Adam, AdamConfig};
+//X pub use checkpoint::{Checkpoint, CheckpointError};
+pub use gae::{StepEnd, Trajectories, advantages};
+pub use kernels::Scalar;
+pub use network::{Activation, Mlp, Workspace};
+pub use normalizer::{FrozenNormalizer, Normalizer};
+pub use policy::{ActWorkspace, Acted, NamedTensor, Policy, PolicySpec, fill_normal};
+pub use ppo::{Batch, Config, Learner, LearnerState, UpdateStats, shuffled};
+pub use random::RngState;
+pub use surrogate::LossTerms;
+pub use value_scale::ValueScale;
+
+/// Why learning can't go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LearnError {
+    #[error("{what} has {found} values where {expected} are needed")]
+    Length {
+        what: String,
+        found: usize,
+        expected: usize,
+    },
+    #[error("{name} is {value}, which lies outside {range}; correct the training configuration")]
+    Setting {
+        name: &'static str,
+        value: String,
+        range: &'static str,
+    },
+    #[error(
+        "observation {column} is not finite; look for a simulation that blew up or a division by zero in the observation"
+    )]
+    Observation { column: usize },
+    #[error(
+        "the gradient is not finite in epoch {epoch}, minibatch {minibatch}; lower the learning rate or look for non-finite rewards and observations"
+    )]
+    Diverged { epoch: usize, minibatch: usize },
+    #[error(
+        "the saved state is for the network {found}, not {expected}; train into a new run folder or use the saved configuration"
+    )]
+    Network { found: String, expected: String },
+}
+
+fn check_length(what: &str, found: usize, expected: usize) -> Result<(), LearnError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(LearnError::Length {
+        what: what.to_owned(),
+        found,
+        expected,
+    })
+}

@@ -1,0 +1,321 @@
+//! The loops that take the time: matrix products, and element-wise passes compiled for several vector widths.
+//!
+//! Element-wise passes are plain Rust compiled once per instruction set and chosen at run time. None of them lets the
+//! compiler contract a multiplication and an addition, and sums run over a fixed number of lanes, so every instruction
+//! set gives the same bits.
+
+use super::network::Activation;
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+
+/// A floating-point type that networks compute in: `f32` to train, `f64` to check.
+pub trait Scalar:
+    Copy
+    + Debug
+    + Default
+    + PartialEq
+    + PartialOrd
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + AddAssign
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    const ZERO: Self;
+    const ONE: Self;
+    fn from_f64(value: f64) -> Self;
+    fn to_f64(self) -> f64;
+    fn exp(self) -> Self;
+    fn tanh(self) -> Self;
+    fn sqrt(self) -> Self;
+}
+
+macro_rules! scalar {
+    ($type:ty) => {
+        impl Scalar for $type {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                value as $type
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                self.exp()
+            }
+            #[inline(always)]
+            fn tanh(self) -> Self {
+                self.tanh()
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
+        }
+    };
+}
+scalar!(f32);
+scalar!(f64);
+
+/// A row-major matrix, read as it is or transposed.
+#[derive(Clone, Copy)]
+pub(crate) struct Matrix<'a, T> {
+    data: &'a [T],
+    rows: usize,
+    columns: usize,
+    row_stride: usize,
+    column_stride: usize,
+}
+
+impl<'a, T> Matrix<'a, T> {
+    /// `data` is `[rows, columns]`.
+    pub(crate) fn new(data: &'a [T], rows: usize, columns: usize) -> Self {
+        assert_eq!(data.len(), rows * columns, "matrix data length");
+        Self {
+            data,
+            rows,
+            columns,
+            row_stride: columns,
+            column_stride: 1,
+        }
+    }
+
+    pub(crate) fn transposed(self) -> Self {
+        Self {
+            data: self.data,
+            rows: self.columns,
+            columns: self.rows,
+            row_stride: self.column_stride,
+            column_stride: self.row_stride,
+        }
+    }
+}
+
+/// `out = left · right`, or `out += left · right` when `accumulate`; `out` is row-major.
+pub(crate) fn multiply<T: Scalar>(
+    out: &mut [T],
+    left: Matrix<T>,
+    right: Matrix<T>,
+    accumulate: bool,
+) {
+    assert_eq!(left.columns, right.rows, "inner dimensions");
+    assert_eq!(out.len(), left.rows * right.columns, "output length");
+    // SAFETY: `Matrix` can only be built with rows × columns elements, and transposing swaps dimensions together with
+    // strides, so every index row · row_stride + column · column_stride lies inside `data`; `out` was checked above and
+    // can't overlap the inputs because it is borrowed mutably. `Scalar` is only implemented for f32 and f64.
+    unsafe {
+        gemm::gemm(
+            left.rows,
+            right.columns,
+            left.columns,
+            out.as_mut_ptr(),
+            1,
+            right.columns as isize,
+            accumulate,
+            left.data.as_ptr(),
+            left.column_stride as isize,
+            left.row_stride as isize,
+            right.data.as_ptr(),
+            right.column_stride as isize,
+            right.row_stride as isize,
+            T::ONE,
+            T::ONE,
+            false,
+            false,
+            false,
+            gemm::Parallelism::None,
+        );
+    }
+}
+
+/// Compiles a function for AVX-512, AVX2 and the baseline, and picks one at run time.
+macro_rules! vectorised {
+    ($(#[$doc:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+        $(#[$doc])*
+        pub(crate) fn $name<T: Scalar>($($argument: $type),*) $(-> $out)? {
+            #[inline(always)]
+            fn body<T: Scalar>($($argument: $type),*) $(-> $out)? $body
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+                fn avx512<T: Scalar>($($argument: $type),*) $(-> $out)? {
+                    body($($argument),*)
+                }
+                #[target_feature(enable = "avx2")]
+                fn avx2<T: Scalar>($($argument: $type),*) $(-> $out)? {
+                    body($($argument),*)
+                }
+                if is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512bw")
+                {
+                    // SAFETY: the processor has every feature that the function is compiled for.
+                    return unsafe { avx512($($argument),*) };
+                }
+                if is_x86_feature_detected!("avx2") {
+                    // SAFETY: as above.
+                    return unsafe { avx2($($argument),*) };
+                }
+            }
+            body($($argument),*)
+        }
+    };
+}
+
+#[inline(always)]
+fn relu<T: Scalar>(x: T) -> T {
+    // In this order a NaN passes through.
+    if x < T::ZERO { T::ZERO } else { x }
+}
+
+#[inline(always)]
+fn elu<T: Scalar>(x: T) -> T {
+    if x < T::ZERO { x.exp() - T::ONE } else { x }
+}
+
+#[inline(always)]
+fn map_rows<T: Scalar>(rows: &mut [T], bias: &[T], f: impl Fn(T) -> T) {
+    for row in rows.chunks_exact_mut(bias.len()) {
+        for (x, &b) in row.iter_mut().zip(bias) {
+            *x = f(*x + b);
+        }
+    }
+}
+
+#[inline(always)]
+fn scale_and_sum_rows<T: Scalar>(
+    delta: &mut [T],
+    output: &[T],
+    sum: &mut [T],
+    slope: impl Fn(T) -> T,
+) {
+    let width = sum.len();
+    for (row, output) in delta
+        .chunks_exact_mut(width)
+        .zip(output.chunks_exact(width))
+    {
+        for ((d, &y), s) in row.iter_mut().zip(output).zip(sum.iter_mut()) {
+            *d = *d * slope(y);
+            *s += *d;
+        }
+    }
+}
+
+vectorised! {
+    /// `rows = activation(rows + bias)` for each row of `bias.len()` values; no activation for `None`.
+    fn bias_and_activate(rows: &mut [T], bias: &[T], activation: Option<Activation>) {
+        match activation {
+            None => map_rows(rows, bias, |x| x),
+            Some(Activation::Relu) => map_rows(rows, bias, relu),
+            Some(Activation::Elu) => map_rows(rows, bias, elu),
+            Some(Activation::Tanh) => map_rows(rows, bias, T::tanh),
+        }
+    }
+}
+
+vectorised! {
+    /// Turns the gradient by a layer's output into the gradient by its pre-activation, given that output, and adds the
+    /// sum over rows to the bias gradient.
+    fn activation_backward(delta: &mut [T], output: &[T], bias_gradient: &mut [T], activation: Activation) {
+        match activation {
+            Activation::Relu => scale_and_sum_rows(delta, output, bias_gradient, |y| {
+                if y > T::ZERO { T::ONE } else { T::ZERO }
+            }),
+            Activation::Elu => scale_and_sum_rows(delta, output, bias_gradient, |y| {
+                if y < T::ZERO { y + T::ONE } else { T::ONE }
+            }),
+            Activation::Tanh => scale_and_sum_rows(delta, output, bias_gradient, |y| T::ONE - y * y),
+        }
+    }
+}
+
+vectorised! {
+    /// Adds each row of `rows` to `sum`.
+    fn sum_rows(rows: &[T], sum: &mut [T]) {
+        for row in rows.chunks_exact(sum.len()) {
+            for (s, &x) in sum.iter_mut().zip(row) {
+                *s += x;
+            }
+        }
+    }
+}
+
+vectorised! {
+    /// `sum += term`.
+    fn add(sum: &mut [T], term: &[T]) {
+        for (s, &x) in sum.iter_mut().zip(term) {
+            *s += x;
+        }
+    }
+}
+
+vectorised! {
+    /// Σ x², over 16 lanes that are added last.
+    fn sum_of_squares(values: &[T]) -> f64 {
+        let mut lanes = [T::ZERO; 16];
+        let blocks = values.chunks_exact(16);
+        let rest = blocks.remainder();
+        for block in blocks {
+            for (lane, &x) in lanes.iter_mut().zip(block) {
+                *lane += x * x;
+            }
+        }
+        for (lane, &x) in lanes.iter_mut().zip(rest) {
+            *lane += x * x;
+        }
+        let mut sum = 0.0;
+        for lane in lanes {
+            sum += lane.to_f64();
+        }
+        sum
+    }
+}
+
+/// The numbers that one Adam step needs, bias corrections folded in.
+#[derive(Clone, Copy)]
+pub(crate) struct AdamStep<T> {
+    /// What the gradient is multiplied by first (clipping).
+    pub(crate) gradient_scale: T,
+    pub(crate) beta1: T,
+    pub(crate) beta2: T,
+    pub(crate) one_minus_beta1: T,
+    pub(crate) one_minus_beta2: T,
+    pub(crate) step_size: T,
+    pub(crate) epsilon: T,
+}
+
+vectorised! {
+    /// One Adam step on a piece of the parameter vector.
+    fn adam(parameters: &mut [T], mean: &mut [T], square: &mut [T], gradient: &[T], step: AdamStep<T>) {
+        let moments = mean.iter_mut().zip(square.iter_mut());
+        for ((p, (m, v)), &g) in parameters.iter_mut().zip(moments).zip(gradient) {
+            let g = g * step.gradient_scale;
+            *m = step.beta1 * *m + step.one_minus_beta1 * g;
+            *v = step.beta2 * *v + step.one_minus_beta2 * (g * g);
+            *p = *p - step.step_size * *m / (v.sqrt() + step.epsilon);
+        }
+    }
+}
+
+vectorised! {
+    /// `out = clamp((raw − mean) · inverse_deviation, ±limit)`, row by row; a NaN stays.
+    fn standardise(raw: &[T], mean: &[T], inverse_deviation: &[T], limit: T, out: &mut [T]) {
+        let width = mean.len();
+        for (row, out) in raw.chunks_exact(width).zip(out.chunks_exact_mut(width)) {
+            for (((&x, &m), &s), y) in row.iter().zip(mean).zip(inverse_deviation).zip(out) {
+                let z = (x - m) * s;
+                let z = if z > limit { limit } else { z };
+                *y = if z < -limit { -limit } else { z };
+            }
+        }
+    }
+}
