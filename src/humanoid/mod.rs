@@ -1,6 +1,21 @@
-//! Humanoid slots: the joints that every humanoid has, whatever its rig calls them.
+//! Humanoid slots: the joints that every humanoid has, whatever its rig calls them, and how they are found.
+//!
+//! Limbs are found by their names where these are telling, else by the shape of the rest pose; the trunk follows
+//! from the tree: hips are where the legs meet, the chest where the arms meet.
 
+mod file;
+mod limbs;
+mod names;
+mod shape;
+mod tree;
+mod trunk;
+
+use crate::clip::Joint;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+pub use file::MapFileError;
 
 /// A place in the canonical humanoid. Serialised in kebab-case, e.g. `left-upper-leg`.
 ///
@@ -32,3 +47,164 @@ pub enum Slot {
     RightFoot,
     RightToes,
 }
+
+impl Slot {
+    /// All slots, in order.
+    pub const ALL: [Slot; 21] = [
+        Slot::Hips,
+        Slot::Spine,
+        Slot::Chest,
+        Slot::Neck,
+        Slot::Head,
+        Slot::LeftShoulder,
+        Slot::LeftUpperArm,
+        Slot::LeftLowerArm,
+        Slot::LeftHand,
+        Slot::RightShoulder,
+        Slot::RightUpperArm,
+        Slot::RightLowerArm,
+        Slot::RightHand,
+        Slot::LeftUpperLeg,
+        Slot::LeftLowerLeg,
+        Slot::LeftFoot,
+        Slot::LeftToes,
+        Slot::RightUpperLeg,
+        Slot::RightLowerLeg,
+        Slot::RightFoot,
+        Slot::RightToes,
+    ];
+
+    /// The slots without which a figure is no humanoid.
+    pub const REQUIRED: [Slot; 12] = [
+        Slot::Hips,
+        Slot::Chest,
+        Slot::LeftUpperArm,
+        Slot::LeftLowerArm,
+        Slot::RightUpperArm,
+        Slot::RightLowerArm,
+        Slot::LeftUpperLeg,
+        Slot::LeftLowerLeg,
+        Slot::LeftFoot,
+        Slot::RightUpperLeg,
+        Slot::RightLowerLeg,
+        Slot::RightFoot,
+    ];
+
+    /// The name under which files know the slot, e.g. `left-upper-leg`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Slot::Hips => "hips",
+            Slot::Spine => "spine",
+            Slot::Chest => "chest",
+            Slot::Neck => "neck",
+            Slot::Head => "head",
+            Slot::LeftShoulder => "left-shoulder",
+            Slot::LeftUpperArm => "left-upper-arm",
+            Slot::LeftLowerArm => "left-lower-arm",
+            Slot::LeftHand => "left-hand",
+            Slot::RightShoulder => "right-shoulder",
+            Slot::RightUpperArm => "right-upper-arm",
+            Slot::RightLowerArm => "right-lower-arm",
+            Slot::RightHand => "right-hand",
+            Slot::LeftUpperLeg => "left-upper-leg",
+            Slot::LeftLowerLeg => "left-lower-leg",
+            Slot::LeftFoot => "left-foot",
+            Slot::LeftToes => "left-toes",
+            Slot::RightUpperLeg => "right-upper-leg",
+            Slot::RightLowerLeg => "right-lower-leg",
+            Slot::RightFoot => "right-foot",
+            Slot::RightToes => "right-toes",
+        }
+    }
+}
+
+impl fmt::Display for Slot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The joint chosen for a slot, and why.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Match {
+    /// Index of the joint in the clip.
+    pub joint: usize,
+    /// From 0 (a guess) to 1 (certain).
+    pub confidence: f64,
+    pub reason: String,
+}
+
+/// Which joint stands for which slot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HumanoidMap {
+    pub matches: BTreeMap<Slot, Match>,
+}
+
+impl HumanoidMap {
+    /// Index of the joint in `slot`.
+    pub fn joint(&self, slot: Slot) -> Option<usize> {
+        self.matches.get(&slot).map(|found| found.joint)
+    }
+
+    fn insert(&mut self, slot: Slot, joint: usize, confidence: f64, reason: String) {
+        self.matches.insert(
+            slot,
+            Match {
+                joint,
+                confidence,
+                reason,
+            },
+        );
+    }
+}
+
+/// Why a figure is taken for no humanoid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NotHumanoid {
+    #[error("{joints} joints are too few for a humanoid, which needs at least {}", Slot::REQUIRED.len())]
+    TooFewJoints { joints: usize },
+    #[error(
+        "no joint found for {}; name them in a map file to use this figure as a humanoid",
+        list(missing)
+    )]
+    Missing { missing: Vec<Slot> },
+    #[error(
+        "the trunk stands at {degrees:.0}° to the legs and the arms point the way the legs do, as in a four-legged animal"
+    )]
+    Quadruped { degrees: f64 },
+}
+
+fn list(slots: &[Slot]) -> String {
+    let names: Vec<&str> = slots.iter().map(|slot| slot.name()).collect();
+    names.join(", ")
+}
+
+/// Finds the joint of every humanoid slot in a joint tree, from names first, then from the shape of the rest pose.
+///
+/// # Errors
+/// [`NotHumanoid`] when a required slot stays empty or the figure stands on four legs.
+pub fn map(joints: &[Joint]) -> Result<HumanoidMap, NotHumanoid> {
+    if joints.len() < Slot::REQUIRED.len() {
+        return Err(NotHumanoid::TooFewJoints {
+            joints: joints.len(),
+        });
+    }
+    let tree = tree::Tree::new(joints);
+    let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
+    let mut found = HumanoidMap::default();
+    limbs::find(&tree, joints, &labels, &mut found);
+    shape::complete(&tree, &mut found);
+    trunk::find(&tree, joints, &labels, &mut found);
+    let missing: Vec<Slot> = Slot::REQUIRED
+        .into_iter()
+        .filter(|slot| found.joint(*slot).is_none())
+        .collect();
+    if !missing.is_empty() {
+        return Err(NotHumanoid::Missing { missing });
+    }
+    shape::refuse_quadruped(&tree, &found)?;
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests;

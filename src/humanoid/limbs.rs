@@ -1,0 +1,145 @@
+//! Arms and legs by name: the chain of joints whose names fit best and which stand below each other.
+
+use super::names::{Label, Part, Side};
+use super::tree::Tree;
+use super::{HumanoidMap, Slot};
+use crate::clip::Joint;
+
+/// Candidates kept per part, so that a file with thousands of equal names costs no more than a rig.
+const CANDIDATES: usize = 12;
+
+/// What a joint loses in confidence when it stands outside the chain of its limb.
+const APART: f64 = 0.4;
+
+type Candidate = (usize, f64);
+
+struct Limb {
+    side: Side,
+    /// Parts of root, bend and end; slots for them.
+    parts: [Part; 3],
+    slots: [Slot; 3],
+    /// A part before the root (clavicle) and one beyond the end (toes), which may be missing.
+    before: Option<(Part, Slot)>,
+    beyond: Option<(Part, Slot)>,
+}
+
+const ARM: [Part; 3] = [Part::UpperArm, Part::LowerArm, Part::Hand];
+const LEG: [Part; 3] = [Part::UpperLeg, Part::LowerLeg, Part::Foot];
+
+const LIMBS: [Limb; 4] = [
+    Limb {
+        side: Side::Left,
+        parts: ARM,
+        slots: [Slot::LeftUpperArm, Slot::LeftLowerArm, Slot::LeftHand],
+        before: Some((Part::Clavicle, Slot::LeftShoulder)),
+        beyond: None,
+    },
+    Limb {
+        side: Side::Right,
+        parts: ARM,
+        slots: [Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand],
+        before: Some((Part::Clavicle, Slot::RightShoulder)),
+        beyond: None,
+    },
+    Limb {
+        side: Side::Left,
+        parts: LEG,
+        slots: [Slot::LeftUpperLeg, Slot::LeftLowerLeg, Slot::LeftFoot],
+        before: None,
+        beyond: Some((Part::Toes, Slot::LeftToes)),
+    },
+    Limb {
+        side: Side::Right,
+        parts: LEG,
+        slots: [Slot::RightUpperLeg, Slot::RightLowerLeg, Slot::RightFoot],
+        before: None,
+        beyond: Some((Part::Toes, Slot::RightToes)),
+    },
+];
+
+pub(super) fn find(tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut HumanoidMap) {
+    for limb in &LIMBS {
+        limb.find(tree, joints, labels, found);
+    }
+}
+
+/// Joints whose names fit, best first, the one nearer the root first among equals.
+fn candidates(labels: &[Label], part: Part, side: Side) -> Vec<Candidate> {
+    let fits = |(j, label): (usize, &Label)| (j, label.fits(part, Some(side)));
+    let mut fitting: Vec<Candidate> = labels.iter().enumerate().map(fits).collect();
+    fitting.retain(|(_, score)| *score > 0.0);
+    fitting.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    fitting.truncate(CANDIDATES);
+    fitting
+}
+
+impl Limb {
+    fn find(&self, tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut HumanoidMap) {
+        let Some(chain) = self.chain(tree, labels) else {
+            return;
+        };
+        // A chain that is whole vouches for names that alone could mean something else.
+        let whole = chain.iter().all(|link| link.is_some_and(|l| !l.2));
+        let sure = |score: f64| if whole { (1.0 + score) / 2.0 } else { score };
+        let said = |j: usize| format!("its name, `{}`", joints[j].name);
+        for (slot, link) in self.slots.into_iter().zip(chain) {
+            let Some((joint, score, apart)) = link else {
+                continue;
+            };
+            let place = if apart {
+                ", though it stands apart from the limb"
+            } else {
+                ""
+            };
+            found.insert(slot, joint, sure(score), said(joint) + place);
+        }
+        let (root, end) = (chain[0].map(|l| l.0), chain[2].map(|l| l.0));
+        if let (Some((part, slot)), Some(root)) = (self.before, root) {
+            let above = candidates(labels, part, self.side);
+            if let Some((j, score)) = above.into_iter().find(|c| tree.is_above(c.0, root)) {
+                found.insert(slot, j, score, said(j));
+            }
+        }
+        if let (Some((part, slot)), Some(end)) = (self.beyond, end) {
+            let below = candidates(labels, part, self.side);
+            let is_next =
+                |c: &Candidate| tree.is_above(end, c.0) && joints[c.0].name != joints[end].name;
+            if let Some((j, score)) = below.into_iter().find(is_next) {
+                found.insert(slot, j, score, said(j));
+            }
+        }
+    }
+
+    /// Best root, bend and end: joint, confidence, whether it stands apart.
+    fn chain(&self, tree: &Tree, labels: &[Label]) -> Option<[Option<(usize, f64, bool)>; 3]> {
+        let [roots, bends, ends] = self.parts.map(|part| candidates(labels, part, self.side));
+        let mut best: Option<(f64, [Option<(usize, f64, bool)>; 3])> = None;
+        for root in &roots {
+            for bend in bends.iter().filter(|b| tree.is_above(root.0, b.0)) {
+                let end = end_of(tree, &ends, root.0, bend.0, self.beyond.is_some());
+                let sum = root.1 + bend.1 + end.map_or(0.0, |e| e.1);
+                if best.is_none_or(|(most, _)| sum > most + 1e-9) {
+                    let link = |c: &Candidate| Some((c.0, c.1, false));
+                    best = Some((sum, [link(root), link(bend), end]));
+                }
+            }
+        }
+        best.map(|(_, chain)| chain)
+    }
+}
+
+/// The end of a limb: nearest below its bend, or else (feet only) one that an IK rig keeps outside of the chain.
+fn end_of(
+    tree: &Tree,
+    ends: &[Candidate],
+    root: usize,
+    bend: usize,
+    may_stand_apart: bool,
+) -> Option<(usize, f64, bool)> {
+    let below = ends.iter().find(|e| tree.is_above(bend, e.0));
+    let apart = ends.iter().find(|e| {
+        may_stand_apart && e.1 > APART && e.0 != root && e.0 != bend && !tree.is_above(root, e.0)
+    });
+    let kept = below.map(|e| (e.0, e.1, false));
+    kept.or_else(|| apart.map(|e| (e.0, e.1 - APART, true)))
+}

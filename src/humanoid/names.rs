@@ -1,0 +1,327 @@
+//! What a joint's name says.
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
+
+/// Part of the body that a name may mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Hips,
+    Trunk,
+    Neck,
+    Head,
+    Clavicle,
+    UpperArm,
+    LowerArm,
+    Hand,
+    UpperLeg,
+    LowerLeg,
+    Foot,
+    Toes,
+}
+
+/// A name taken to pieces.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Label {
+    pub side: Option<Side>,
+    /// The name's words without prefix, side and number, written as one: `upperleg`.
+    pub core: String,
+}
+
+/// Words of joints that stand in no slot: fingers, faces, ends, helpers of a rig.
+const FOREIGN: [&str; 54] = [
+    "thumb",
+    "index",
+    "middle",
+    "ring",
+    "pinky",
+    "pinkie",
+    "little",
+    "finger",
+    "fingers",
+    "carpal",
+    "metacarpal",
+    "palm",
+    "end",
+    "tip",
+    "top",
+    "nub",
+    "site",
+    "twist",
+    "roll",
+    "ik",
+    "fk",
+    "pole",
+    "pt",
+    "target",
+    "ctrl",
+    "control",
+    "effector",
+    "socket",
+    "slot",
+    "handslot",
+    "weapon",
+    "prop",
+    "attach",
+    "eye",
+    "eyes",
+    "eyebrow",
+    "jaw",
+    "tongue",
+    "hair",
+    "ear",
+    "tail",
+    "breast",
+    "cloth",
+    "skirt",
+    "cape",
+    "hat",
+    "muscle",
+    "helper",
+    "share",
+    "mesh",
+    "geo",
+    "camera",
+    "light",
+    "handle",
+];
+
+/// Words that say nothing about the part: prefixes of rigs and kinds of node.
+const NOISE: [&str; 24] = [
+    "mixamorig",
+    "def",
+    "org",
+    "bip",
+    "biped",
+    "valve",
+    "bind",
+    "jnt",
+    "joint",
+    "bone",
+    "character",
+    "cc",
+    "base",
+    "rig",
+    "armature",
+    "skeleton",
+    "sk",
+    "drv",
+    "b",
+    "j",
+    "c",
+    "m",
+    "g",
+    "human",
+];
+
+/// What the core of a sided name means, best first.
+fn sided(core: &str) -> &'static [(Part, f64)] {
+    match core {
+        "upleg" | "upperleg" | "legupper" | "thigh" | "upperthigh" | "femur" => {
+            &[(Part::UpperLeg, 1.0)]
+        }
+        "hip" | "hips" => &[(Part::UpperLeg, 0.8)],
+        "lowerleg" | "leglower" | "lowleg" | "calf" | "shin" | "knee" | "tibia" | "crus" => {
+            &[(Part::LowerLeg, 1.0)]
+        }
+        "leg" => &[
+            (Part::LowerLeg, 0.9),
+            (Part::UpperLeg, 0.5),
+            (Part::Foot, 0.2),
+        ],
+        "foot" | "ankle" => &[(Part::Foot, 1.0), (Part::Toes, 0.2)],
+        "toe" | "toes" | "ball" | "forefoot" => &[(Part::Toes, 1.0)],
+        "clavicle" | "collar" | "collarbone" => &[(Part::Clavicle, 1.0)],
+        "shoulder" => &[(Part::Clavicle, 0.9), (Part::UpperArm, 0.6)],
+        "upperarm" | "armupper" | "uparm" | "humerus" => &[(Part::UpperArm, 1.0)],
+        "shldr" => &[(Part::UpperArm, 0.9), (Part::Clavicle, 0.5)],
+        "arm" => &[
+            (Part::UpperArm, 0.9),
+            (Part::LowerArm, 0.4),
+            (Part::Hand, 0.2),
+        ],
+        "forearm" | "lowerarm" | "armlower" | "lowarm" | "elbow" | "radius" | "ulna" => {
+            &[(Part::LowerArm, 1.0)]
+        }
+        "hand" | "wrist" => &[(Part::Hand, 1.0)],
+        "fist" => &[(Part::Hand, 0.9)],
+        _ => &[],
+    }
+}
+
+/// What the core of a name without side means.
+fn central(core: &str) -> Option<Part> {
+    match core {
+        "hips" | "hip" | "pelvis" => Some(Part::Hips),
+        "spine" | "chest" | "upperchest" | "torso" | "abdomen" | "thorax" | "waist" | "back"
+        | "lowerback" | "upperback" | "body" | "ribcage" => Some(Part::Trunk),
+        "neck" => Some(Part::Neck),
+        "head" | "skull" => Some(Part::Head),
+        _ => None,
+    }
+}
+
+impl Label {
+    pub fn new(name: &str) -> Label {
+        let local = name.rsplit([':', '|']).next().unwrap_or(name);
+        let mut side = None;
+        let mut core = String::new();
+        for word in words(local) {
+            let (found, rest) = split_side(&word);
+            match (side, found) {
+                (None, Some(found)) => side = Some(found),
+                (Some(one), Some(other)) if one != other => return Label::foreign(),
+                _ => {}
+            }
+            if FOREIGN.contains(&rest) {
+                return Label::foreign();
+            }
+            if !NOISE.contains(&rest) {
+                core.push_str(rest);
+            }
+        }
+        Label { side, core }
+    }
+
+    fn foreign() -> Label {
+        Label {
+            side: None,
+            core: String::new(),
+        }
+    }
+
+    /// How well the name fits `part` on `side`, from 0 to 1.
+    pub fn fits(&self, part: Part, side: Option<Side>) -> f64 {
+        if self.side != side {
+            return 0.0;
+        }
+        let score = |found: &&(Part, f64)| found.0 == part;
+        match side {
+            Some(_) => sided(&self.core).iter().find(score).map_or(0.0, |s| s.1),
+            None if central(&self.core) == Some(part) => 1.0,
+            None => 0.0,
+        }
+    }
+}
+
+/// Lower-case words of a name: split at what is no letter, and where lower case turns into upper case.
+fn words(name: &str) -> Vec<String> {
+    let letters: Vec<char> = name.chars().collect();
+    let mut words = vec![String::new()];
+    for (i, c) in letters.iter().enumerate() {
+        let before = i.checked_sub(1).map(|k| letters[k]);
+        let after = letters.get(i + 1);
+        let starts = c.is_uppercase()
+            && (before.is_some_and(char::is_lowercase)
+                || (before.is_some_and(char::is_uppercase)
+                    && after.is_some_and(|a| a.is_lowercase())));
+        if starts || !c.is_alphabetic() {
+            words.push(String::new());
+        }
+        if c.is_alphabetic()
+            && let Some(last) = words.last_mut()
+        {
+            last.extend(c.to_lowercase());
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+/// Side that a word names, and what is left of the word.
+fn split_side(word: &str) -> (Option<Side>, &str) {
+    match word {
+        "l" | "left" | "lft" => return (Some(Side::Left), ""),
+        "r" | "right" | "rgt" => return (Some(Side::Right), ""),
+        _ => {}
+    }
+    for (spelling, side) in [("left", Side::Left), ("right", Side::Right)] {
+        if let Some(rest) = word
+            .strip_prefix(spelling)
+            .or_else(|| word.strip_suffix(spelling))
+        {
+            return (Some(side), rest);
+        }
+    }
+    // `lthigh`: one letter is taken for a side only before a word that is known to have one.
+    for (spelling, side) in [("l", Side::Left), ("r", Side::Right)] {
+        if let Some(rest) = word.strip_prefix(spelling)
+            && !sided(rest).is_empty()
+        {
+            return (Some(side), rest);
+        }
+    }
+    (None, word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn label(name: &str) -> (Option<Side>, String) {
+        let label = Label::new(name);
+        (label.side, label.core)
+    }
+
+    #[test]
+    fn spellings_of_many_rigs_say_the_same() {
+        for name in [
+            "mixamorig:LeftUpLeg",
+            "mixamorig_LeftUpLeg",
+            "mixamorig1:LeftUpLeg",
+            "Armature|LeftUpLeg",
+        ] {
+            assert_eq!(label(name), (Some(Side::Left), "upleg".into()), "{name}");
+        }
+        for name in [
+            "upperarm.r",
+            "UpperArm.R",
+            "DEF-upper_arm.R",
+            "J_Bip_R_UpperArm",
+            "rightUpperArm",
+        ] {
+            assert_eq!(
+                label(name),
+                (Some(Side::Right), "upperarm".into()),
+                "{name}"
+            );
+        }
+        for name in [
+            "lThigh",
+            "thigh_l",
+            "Bip01 L Thigh",
+            "ValveBiped.Bip01_L_Thigh",
+            "lthigh",
+        ] {
+            assert_eq!(label(name), (Some(Side::Left), "thigh".into()), "{name}");
+        }
+        assert_eq!(label("LHipJoint"), (Some(Side::Left), "hip".into()));
+        assert_eq!(label("RIGHT_KNEE"), (Some(Side::Right), "knee".into()));
+    }
+
+    #[test]
+    fn ends_fingers_and_helpers_are_no_part() {
+        for name in [
+            "mixamorig:LeftToe_End",
+            "mixamorig:HeadTop_End",
+            "LeftHandThumb1",
+            "handslot.l",
+            "PoleTarget.L",
+            "LeftArmTwist",
+            "foot_IK.l",
+            "index_01_r",
+            "LeftEye",
+        ] {
+            assert_eq!(Label::new(name).core, "", "{name}");
+        }
+    }
+
+    #[test]
+    fn words_that_begin_with_l_or_r_keep_their_letter() {
+        assert_eq!(label("root"), (None, "root".into()));
+        assert_eq!(label("LowerBack"), (None, "lowerback".into()));
+    }
+}
