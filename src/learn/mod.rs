@@ -13,7 +13,9 @@ mod normalizer;
 mod policy;
 mod ppo;
 mod random;
+mod rollout;
 mod surrogate;
+mod trainer;
 mod value_scale;
 
 pub use adam::{Adam, AdamConfig};
@@ -26,6 +28,7 @@ pub use policy::{ActWorkspace, Acted, NamedTensor, Policy, PolicySpec, fill_norm
 pub use ppo::{Batch, Config, Learner, LearnerState, UpdateStats, shuffled};
 pub use random::RngState;
 pub use surrogate::LossTerms;
+pub use trainer::{Metrics, Plan, TrainError, Trainer, TrainerState};
 pub use value_scale::ValueScale;
 
 /// Why learning can't go on.

@@ -1,10 +1,11 @@
 //! Phase-based imitation: one environment.
 
-use super::observe::{layout, observe};
+use super::observe::{observation_size, observe};
 use super::reference::{Reference, Sample};
 use super::reward::{Terms, terms};
 use super::setting::{Actions, Setting, Stage};
 use super::terminate::{Failure, failure};
+use crate::clip::LoopMode;
 use crate::sim::{LinkJoint, LinkState, Target, World};
 use crate::skeleton::Drive;
 use crate::task::Dynamics;
@@ -64,7 +65,7 @@ impl Imitate {
     }
 
     pub fn observation_size(&self) -> usize {
-        layout(&self.stage, self.reference.contact_links.len()).iter().map(|b| b.size).sum()
+        observation_size(&self.stage, self.reference.contact_links.len())
     }
 
     pub fn action_size(&self) -> usize {
@@ -84,11 +85,21 @@ impl Imitate {
     /// Latest start that leaves something to do, seconds.
     pub fn last_start(&self) -> f64 {
         match self.reference.loop_mode() {
-            crate::clip::LoopMode::Wrap => self.reference.duration(),
-            crate::clip::LoopMode::Clamp => {
+            LoopMode::Wrap => self.reference.duration(),
+            LoopMode::Clamp => {
                 (self.reference.duration() - 2.0 * self.setting.physics.control_dt()).max(0.0)
             }
         }
+    }
+
+    /// Steps from here to the end of the motion or the time limit, whichever is nearer.
+    pub fn possible_steps(&self) -> f64 {
+        let limit = self.setting.episode_s - (self.time - self.started);
+        let left = match self.reference.loop_mode() {
+            LoopMode::Wrap => limit,
+            LoopMode::Clamp => limit.min(self.reference.duration() - self.time),
+        };
+        (left * self.setting.physics.control_hz - 1e-6).ceil().max(1.0)
     }
 
     /// Writes what the policy sees.

@@ -13,7 +13,7 @@ mod terminate;
 
 pub use dynamics::Dynamics;
 pub use imitate::{Imitate, Outcome, Step};
-pub use observe::{Block, layout};
+pub use observe::{Block, layout, observation_size};
 pub use reference::{Reference, Sample};
 pub use reward::{TERM_NAMES, Terms};
 pub use setting::{Actions, Rewards, Setting, Stage, TaskError, Terminations};

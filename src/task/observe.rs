@@ -41,6 +41,11 @@ pub fn layout(stage: &Stage, contacts: usize) -> Vec<Block> {
     ]
 }
 
+/// Length of an observation for a motion with `contacts` contact bodies.
+pub fn observation_size(stage: &Stage, contacts: usize) -> usize {
+    layout(stage, contacts).iter().map(|block| block.size).sum()
+}
+
 /// Writes values one after the other.
 struct Writer<'a> {
     out: &'a mut [f32],

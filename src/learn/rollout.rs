@@ -1,0 +1,206 @@
+//! Environments acting under the current policy, in groups that share one network call per step.
+//!
+//! A group is the unit of parallel work. Which environments it holds depends on the configuration alone, never on
+//! the number of threads, and every environment has its own random stream: so the samples are the same everywhere.
+
+use super::{ActWorkspace, FrozenNormalizer, LearnError, Policy, StepEnd, fill_normal};
+use crate::task::{Imitate, Outcome, Reference, Setting, Stage, TERM_NAMES};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::sync::Arc;
+
+/// What the environments of a group act with.
+pub(super) struct Actor<'a> {
+    pub policy: &'a Policy,
+    pub parameters: &'a [f32],
+    pub normalizer: &'a FrozenNormalizer<f32>,
+}
+
+/// Samples of one iteration; `[steps, environments]` row-major, observations and actions a row more.
+#[derive(Default)]
+pub(super) struct Buffer {
+    /// As the environments gave them.
+    pub raw: Vec<f32>,
+    /// As the network saw them.
+    pub observations: Vec<f32>,
+    pub actions: Vec<f32>,
+    pub log_probs: Vec<f32>,
+    pub values: Vec<f32>,
+    pub rewards: Vec<f32>,
+    pub ends: Vec<StepEnd>,
+    pub final_values: Vec<f32>,
+    /// `[environments]`.
+    pub next_values: Vec<f32>,
+    /// Every episode that ended.
+    pub episodes: Vec<Episode>,
+    /// Sums over all steps, in the order of [`TERM_NAMES`].
+    pub terms: [f64; TERM_NAMES.len()],
+}
+
+impl Buffer {
+    fn clear(&mut self) {
+        for values in [&mut self.raw, &mut self.observations, &mut self.actions, &mut self.log_probs] {
+            values.clear();
+        }
+        for values in [&mut self.values, &mut self.rewards, &mut self.final_values, &mut self.next_values] {
+            values.clear();
+        }
+        self.ends.clear();
+        self.episodes.clear();
+        self.terms = [0.0; TERM_NAMES.len()];
+    }
+}
+
+/// How an episode went.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Episode {
+    /// Sum of rewards.
+    pub reward: f32,
+    pub steps: u32,
+    /// Steps that it would have had without failing.
+    pub possible: f64,
+}
+
+/// One environment, its random stream and its running episode.
+struct Player {
+    env: Imitate,
+    number: u64,
+    rng: ChaCha8Rng,
+    episode: Episode,
+}
+
+/// Environments that step together.
+pub(super) struct Group {
+    players: Vec<Player>,
+    /// Current raw observations, `[environments, observation]`.
+    current: Vec<f32>,
+    normal: Vec<f32>,
+    noise: Vec<f32>,
+    workspace: ActWorkspace<f32>,
+    start_anywhere: bool,
+    pub buffer: Buffer,
+}
+
+impl Group {
+    /// Environments number `first` to `first + count`, which take the references in turn.
+    pub fn new(stage: &Arc<Stage>, references: &[Arc<Reference>], setting: &Setting, first: usize, count: usize) -> Self {
+        let players: Vec<Player> = (first..first + count)
+            .map(|number| Player {
+                env: Imitate::new(stage.clone(), references[number % references.len()].clone(), setting),
+                number: number as u64,
+                rng: ChaCha8Rng::seed_from_u64(0),
+                episode: Episode::default(),
+            })
+            .collect();
+        let width = players[0].env.observation_size();
+        Group {
+            current: vec![0.0; count * width],
+            normal: vec![0.0; count * width],
+            noise: vec![0.0; count * players[0].env.action_size()],
+            players,
+            workspace: ActWorkspace::default(),
+            start_anywhere: setting.start_anywhere,
+            buffer: Buffer::default(),
+        }
+    }
+
+    /// Starts every environment anew, from a random stream that `seed`, `round` and its number determine alone.
+    pub fn restart(&mut self, seed: u64, round: u64) {
+        let width = self.width();
+        for (player, row) in self.players.iter_mut().zip(self.current.chunks_exact_mut(width)) {
+            player.rng = stream(seed, player.number + 1, round);
+            player.begin(self.start_anywhere);
+            player.env.observe(row);
+        }
+    }
+
+    /// Plays `steps` steps in every environment and keeps the samples.
+    pub fn collect(&mut self, steps: usize, actor: &Actor) -> Result<(), LearnError> {
+        self.buffer.clear();
+        for _ in 0..steps {
+            self.act(actor)?;
+            self.step(actor)?;
+        }
+        actor.normalizer.apply(&self.current, &mut self.normal)?;
+        let values = actor.policy.values(actor.parameters, &self.normal, &mut self.workspace)?;
+        self.buffer.next_values.extend_from_slice(values);
+        Ok(())
+    }
+
+    fn width(&self) -> usize {
+        self.current.len() / self.players.len()
+    }
+
+    fn act(&mut self, actor: &Actor) -> Result<(), LearnError> {
+        let actions = self.noise.len() / self.players.len();
+        for (player, noise) in self.players.iter_mut().zip(self.noise.chunks_exact_mut(actions)) {
+            fill_normal(noise, &mut player.rng);
+        }
+        actor.normalizer.apply(&self.current, &mut self.normal)?;
+        let acted = actor.policy.act(actor.parameters, &self.normal, &self.noise, &mut self.workspace)?;
+        let buffer = &mut self.buffer;
+        buffer.raw.extend_from_slice(&self.current);
+        buffer.observations.extend_from_slice(&self.normal);
+        buffer.actions.extend_from_slice(acted.actions);
+        buffer.log_probs.extend_from_slice(acted.log_probs);
+        buffer.values.extend_from_slice(acted.values);
+        Ok(())
+    }
+
+    fn step(&mut self, actor: &Actor) -> Result<(), LearnError> {
+        let (width, actions) = (self.width(), self.noise.len() / self.players.len());
+        let first = self.buffer.actions.len() - self.noise.len();
+        for (i, player) in self.players.iter_mut().enumerate() {
+            let from = first + i * actions;
+            let step = player.env.step(&self.buffer.actions[from..from + actions]);
+            let row = &mut self.current[i * width..(i + 1) * width];
+            player.env.observe(row);
+            player.episode.reward += step.reward;
+            player.episode.steps += 1;
+            for (sum, term) in self.buffer.terms.iter_mut().zip(step.terms.values()) {
+                *sum += f64::from(term);
+            }
+            let (end, final_value) = match step.outcome {
+                Outcome::Running => (StepEnd::Continues, 0.0),
+                Outcome::Failed(_) | Outcome::Finished => (StepEnd::Terminated, 0.0),
+                Outcome::TimeLimit => {
+                    let seen = &mut self.normal[..width];
+                    actor.normalizer.apply(row, seen)?;
+                    let value = actor.policy.values(actor.parameters, seen, &mut self.workspace)?[0];
+                    (StepEnd::Truncated, value)
+                }
+            };
+            self.buffer.rewards.push(step.reward);
+            self.buffer.ends.push(end);
+            self.buffer.final_values.push(final_value);
+            if step.outcome != Outcome::Running {
+                self.buffer.episodes.push(player.episode);
+                player.begin(self.start_anywhere);
+                player.env.observe(row);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Player {
+    fn begin(&mut self, anywhere: bool) {
+        let share = if anywhere { uniform(&mut self.rng) } else { 0.0 };
+        self.env.reset(share * self.env.last_start());
+        self.episode = Episode { possible: self.env.possible_steps(), ..Episode::default() };
+    }
+}
+
+/// The random stream `number` of a seed, at its `round`th part.
+pub(super) fn stream(seed: u64, number: u64, round: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(number);
+    // Far more numbers than one round can use.
+    rng.set_word_pos(u128::from(round) << 40);
+    rng
+}
+
+/// Uniform in [0, 1), from the upper 53 bits.
+fn uniform(rng: &mut ChaCha8Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}

@@ -1,0 +1,310 @@
+//! A training run: rollouts, advantages, updates, in iterations that read top to bottom.
+
+use super::rollout::{Actor, Buffer, Group, stream};
+use super::{
+    Batch, Config, LearnError, Learner, LearnerState, Normalizer, PolicySpec, Trajectories, UpdateStats,
+    advantages,
+};
+use crate::motion::Motion;
+use crate::task::{Reference, Setting, Stage, TERM_NAMES, TaskError, observation_size};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Everything that decides what a run learns. The number of threads does not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Plan {
+    pub seed: u64,
+    pub task: Setting,
+    pub ppo: Config,
+    /// Widths of the hidden layers of actor and critic.
+    pub hidden: Vec<usize>,
+    /// Environments that act side by side.
+    pub environments: usize,
+    /// Environments that share a network call.
+    pub group: usize,
+    /// Control steps of each environment in an iteration.
+    pub horizon: usize,
+    /// Iterations after which all episodes begin anew. Between rounds nothing but the learner has a state, so that is
+    /// where a run can be stopped and resumed to the same bits.
+    pub round: u64,
+    /// Samples after which training ends.
+    pub samples: u64,
+    /// Action noise at the end, as a share of that at the start; it shrinks evenly over the samples.
+    pub final_std: f64,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            task: Setting::default(),
+            ppo: Config { initial_std: 0.5, target_kl: Some(0.05), ..Config::default() },
+            hidden: vec![256, 128],
+            environments: 64,
+            group: 16,
+            horizon: 64,
+            round: 20,
+            samples: 5_000_000,
+            final_std: 0.4,
+        }
+    }
+}
+
+/// Why a run can't be set up or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    #[error(transparent)]
+    Task(#[from] TaskError),
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    #[error("{0} must be at least 1")]
+    Zero(&'static str),
+    #[error("there is no motion to learn")]
+    NoMotion,
+}
+
+/// What an iteration did.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Metrics {
+    pub iteration: u64,
+    pub samples: u64,
+    /// Mean sum of rewards over the episodes that ended.
+    #[serde(rename = "return")]
+    pub episode_return: f64,
+    /// Mean over those episodes of return ÷ the steps that a perfect one would have had.
+    pub normalized_return: f64,
+    /// Mean length of those episodes, seconds.
+    pub episode_length: f64,
+    /// Episodes that ended.
+    pub episodes: u64,
+    #[serde(flatten)]
+    pub update: UpdateStats,
+    /// Standard deviation of the action noise.
+    pub action_std: f64,
+    /// Mean of each reward term over all steps.
+    pub reward_terms: BTreeMap<String, f64>,
+}
+
+/// What a run is between two rounds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainerState {
+    pub iteration: u64,
+    pub learner: LearnerState<f32>,
+    pub normalizer: Normalizer,
+}
+
+/// A run in memory.
+pub struct Trainer {
+    plan: Plan,
+    learner: Learner<f32>,
+    normalizer: Normalizer,
+    groups: Vec<Group>,
+    iteration: u64,
+    control_dt: f64,
+    batch: Samples,
+}
+
+/// The iteration's samples, one group after the other.
+#[derive(Default)]
+struct Samples {
+    observations: Vec<f32>,
+    actions: Vec<f32>,
+    log_probs: Vec<f32>,
+    values: Vec<f32>,
+    advantages: Vec<f32>,
+    returns: Vec<f32>,
+}
+
+const OBSERVATION_LIMIT: f64 = 10.0;
+
+impl Trainer {
+    /// # Errors
+    /// A plan or a motion that can't be trained.
+    pub fn new(plan: Plan, stage: Stage, motions: &[Motion]) -> Result<Self, TrainError> {
+        for (name, value) in [("environments", plan.environments), ("group", plan.group), ("horizon", plan.horizon)] {
+            if value == 0 {
+                return Err(TrainError::Zero(name));
+            }
+        }
+        let references: Result<Vec<_>, _> = motions
+            .iter()
+            .map(|motion| Reference::new(motion, &stage, motion.duration() + plan.task.episode_s + 1.0).map(Arc::new))
+            .collect();
+        let references = references?;
+        let contacts = references.first().ok_or(TrainError::NoMotion)?.contact_links.len();
+        let spec = PolicySpec {
+            observation: observation_size(&stage, contacts),
+            action: stage.character.dof,
+            hidden: plan.hidden.clone(),
+            activation: Default::default(),
+        };
+        let learner = Learner::new(plan.ppo.clone(), spec, &mut stream(plan.seed, 0, 0))?;
+        let stage = Arc::new(stage);
+        let starts: Vec<usize> = (0..plan.environments).step_by(plan.group).collect();
+        let groups = starts
+            .into_iter()
+            .map(|first| {
+                let count = plan.group.min(plan.environments - first);
+                Group::new(&stage, &references, &plan.task, first, count)
+            })
+            .collect();
+        Ok(Trainer {
+            normalizer: Normalizer::new(learner.policy().spec().observation),
+            control_dt: plan.task.physics.control_dt(),
+            plan,
+            learner,
+            groups,
+            iteration: 0,
+            batch: Samples::default(),
+        })
+    }
+
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    pub fn learner(&self) -> &Learner<f32> {
+        &self.learner
+    }
+
+    pub fn normalizer(&self) -> &Normalizer {
+        &self.normalizer
+    }
+
+    /// Control steps taken by all environments together.
+    pub fn samples(&self) -> u64 {
+        self.iteration * (self.plan.environments * self.plan.horizon) as u64
+    }
+
+    /// Whether the samples of the plan are used up.
+    pub fn is_done(&self) -> bool {
+        self.samples() >= self.plan.samples
+    }
+
+    /// Whether the run stands between two rounds, where it can be saved and resumed to the same bits.
+    pub fn is_between_rounds(&self) -> bool {
+        self.iteration % self.plan.round.max(1) == 0
+    }
+
+    pub fn state(&self) -> TrainerState {
+        TrainerState {
+            iteration: self.iteration,
+            learner: self.learner.state().clone(),
+            normalizer: self.normalizer.clone(),
+        }
+    }
+
+    /// Goes on from a saved state of the same plan.
+    ///
+    /// # Errors
+    /// A state of another network.
+    pub fn restore(&mut self, state: TrainerState) -> Result<(), LearnError> {
+        self.learner.restore(state.learner)?;
+        self.normalizer = state.normalizer;
+        self.iteration = state.iteration;
+        Ok(())
+    }
+
+    /// Plays, learns, and says how it went. Runs on the current rayon pool, with the same bits at any size of it.
+    ///
+    /// # Errors
+    /// A quantity that stopped being finite.
+    pub fn iterate(&mut self) -> Result<Metrics, LearnError> {
+        let std = self.schedule_noise();
+        self.play()?;
+        self.gather()?;
+        let batch = Batch {
+            observations: &self.batch.observations,
+            actions: &self.batch.actions,
+            log_probs: &self.batch.log_probs,
+            values: &self.batch.values,
+            advantages: &self.batch.advantages,
+            returns: &self.batch.returns,
+        };
+        let update = self.learner.update(&batch, &mut stream(self.plan.seed, 0, self.iteration + 1))?;
+        for group in &self.groups {
+            self.normalizer.update(&group.buffer.raw)?;
+        }
+        self.iteration += 1;
+        Ok(self.metrics(update, std))
+    }
+
+    fn schedule_noise(&mut self) -> f64 {
+        let done = (self.samples() as f64 / self.plan.samples.max(1) as f64).min(1.0);
+        let std = self.plan.ppo.initial_std * (1.0 + (self.plan.final_std - 1.0) * done);
+        if !self.plan.ppo.learn_std {
+            self.learner.set_std(std);
+        }
+        std
+    }
+
+    fn play(&mut self) -> Result<(), LearnError> {
+        if self.is_between_rounds() {
+            let (seed, round) = (self.plan.seed, self.iteration / self.plan.round.max(1));
+            self.groups.par_iter_mut().for_each(|group| group.restart(seed, round));
+        }
+        let normalizer = self.normalizer.frozen(OBSERVATION_LIMIT);
+        let actor = Actor {
+            policy: self.learner.policy(),
+            parameters: self.learner.parameters(),
+            normalizer: &normalizer,
+        };
+        let steps = self.plan.horizon;
+        self.groups.par_iter_mut().try_for_each(|group| group.collect(steps, &actor))
+    }
+
+    fn gather(&mut self) -> Result<(), LearnError> {
+        let batch = &mut self.batch;
+        for values in [&mut batch.observations, &mut batch.actions, &mut batch.log_probs, &mut batch.values] {
+            values.clear();
+        }
+        batch.advantages.clear();
+        batch.returns.clear();
+        for group in &self.groups {
+            let from = &group.buffer;
+            batch.observations.extend_from_slice(&from.observations);
+            batch.actions.extend_from_slice(&from.actions);
+            batch.log_probs.extend_from_slice(&from.log_probs);
+            batch.values.extend_from_slice(&from.values);
+            let start = batch.advantages.len();
+            batch.advantages.resize(start + from.rewards.len(), 0.0);
+            batch.returns.resize(start + from.rewards.len(), 0.0);
+            let rollout = Trajectories {
+                environments: from.next_values.len(),
+                rewards: &from.rewards,
+                values: &from.values,
+                ends: &from.ends,
+                final_values: &from.final_values,
+                next_values: &from.next_values,
+            };
+            let (advantage, value) = (&mut batch.advantages[start..], &mut batch.returns[start..]);
+            advantages(&rollout, self.plan.ppo.gamma, self.plan.ppo.lambda, advantage, value)?;
+        }
+        Ok(())
+    }
+
+    fn metrics(&self, update: UpdateStats, action_std: f64) -> Metrics {
+        let buffers = || self.groups.iter().map(|group| &group.buffer);
+        let episodes: Vec<_> = buffers().flat_map(|b: &Buffer| &b.episodes).collect();
+        let n = episodes.len().max(1) as f64;
+        let steps = buffers().map(|b| b.ends.len()).sum::<usize>().max(1) as f64;
+        let reward_terms = TERM_NAMES.iter().enumerate().map(|(i, name)| {
+            let sum: f64 = buffers().map(|b| b.terms[i]).sum();
+            ((*name).to_owned(), sum / steps)
+        });
+        Metrics {
+            iteration: self.iteration,
+            samples: self.samples(),
+            episode_return: episodes.iter().map(|e| f64::from(e.reward)).sum::<f64>() / n,
+            normalized_return: episodes.iter().map(|e| f64::from(e.reward) / e.possible).sum::<f64>() / n,
+            episode_length: episodes.iter().map(|e| f64::from(e.steps)).sum::<f64>() / n * self.control_dt,
+            episodes: episodes.len() as u64,
+            update,
+            action_std,
+            reward_terms: reward_terms.collect(),
+        }
+    }
+}
