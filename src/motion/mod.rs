@@ -1,7 +1,22 @@
 //! A motion: what a skeleton does, frame by frame, and the tracks computed from it.
 
+mod build;
+pub mod contact;
+mod error;
+mod file;
+mod momentum;
+mod nnls;
+mod phase;
+mod sample;
+mod timeline;
+mod velocity;
+mod wrench;
+
+pub use build::Draft;
+pub use error::MotionError;
+
 use crate::clip::LoopMode;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3, Vector6};
 
 /// Per-frame quantities computed from a motion's poses and velocities.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +71,14 @@ pub struct Motion {
     pub report: serde_json::Value,
 }
 
+impl Cycle {
+    /// No travel.
+    pub const NONE: Self = Self {
+        translation: Vector3::new(0.0, 0.0, 0.0),
+        heading: 0.0,
+    };
+}
+
 impl Motion {
     /// Seconds from the first frame to the last.
     pub fn duration(&self) -> f64 {
@@ -64,9 +87,6 @@ impl Motion {
 
     /// World transform that carries the first cycle to cycle number `n`.
     pub fn cycle_offset(&self, n: i64) -> Isometry3<f64> {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.cycle.heading);
-        let step = Isometry3::from_parts(self.cycle.translation.into(), turn);
-        let one = if n < 0 { step.inverse() } else { step };
-        (0..n.unsigned_abs()).fold(Isometry3::identity(), |at, _| at * one)
+        self.cycle.offset(n)
     }
 }

@@ -162,7 +162,7 @@ impl<'a> Builder<'a> {
                 (None, false) => {
                     return Err(self.error(
                         place(),
-                        "its top body has no free joint; add <freejoint/> and take away joints of scenery",
+                        "it moves, but no body above it has a free joint; add <freejoint/> to the character's top body, and take scenery with joints away",
                     ));
                 }
                 (None, true) if !self.bodies.is_empty() => {

@@ -1,0 +1,179 @@
+//! When a foot stands on the ground, from the paths of its points.
+//!
+//! A point stands while it is slow and low. All lengths are in leg lengths and all times in seconds, so that a
+//! child's walk at 30 Hz and a giant's at 120 Hz get the same labels. Velocities are averaged over 1/30 s; a stance
+//! has to be clearly slow and low somewhere, and extends as far as it stays fairly so (hysteresis, the same in both
+//! directions of time); short gaps are closed and short touches dropped.
+
+use crate::clip::LoopMode;
+use nalgebra::Vector3;
+
+/// Leg lengths per second below which a point is clearly, and at most fairly, at rest.
+const SPEED: [f64; 2] = [0.25, 0.4];
+/// Leg lengths above the floor below which a point is clearly, and at most fairly, down.
+const HEIGHT: [f64; 2] = [0.04, 0.06];
+/// Averaging window of velocity and height, s.
+const WINDOW: f64 = 1.0 / 30.0;
+/// Shortest stance and shortest gap between stances, s.
+const SHORTEST: f64 = 0.08;
+/// Share of frames in which a point may be below its floor level.
+const FLOOR_QUANTILE: f64 = 0.05;
+
+/// Whether a foot stands on the ground, per frame.
+///
+/// `points[f]` are positions of the foot's points (joints, corners, …) at frame `f`, world frame, metres, the same
+/// points in the same order in every frame. Every point's level of the floor is taken from the clip: where it is
+/// lowest. A foot that never comes down needs [`detect_above`].
+pub fn detect(
+    points: &[Vec<Vector3<f64>>],
+    fps: f64,
+    leg_length: f64,
+    loop_mode: LoopMode,
+) -> Vec<bool> {
+    detect_each(points, fps, leg_length, loop_mode, floor_level)
+}
+
+/// The same with the ground at height `floor`.
+pub fn detect_above(
+    points: &[Vec<Vector3<f64>>],
+    floor: f64,
+    fps: f64,
+    leg_length: f64,
+    loop_mode: LoopMode,
+) -> Vec<bool> {
+    detect_each(points, fps, leg_length, loop_mode, |_| floor)
+}
+
+fn detect_each(
+    points: &[Vec<Vector3<f64>>],
+    fps: f64,
+    leg_length: f64,
+    loop_mode: LoopMode,
+    floor: impl Fn(&[Vector3<f64>]) -> f64,
+) -> Vec<bool> {
+    let count = points.iter().map(Vec::len).min().unwrap_or(0);
+    let mut stands = vec![false; points.len()];
+    for point in 0..count {
+        let path: Vec<Vector3<f64>> = points.iter().map(|frame| frame[point]).collect();
+        let level = floor(&path);
+        let states = states(&path, level, fps, leg_length, loop_mode);
+        for run in runs(&states, loop_mode, |s| *s != State::Away) {
+            if run.iter().any(|&f| states[f] == State::Clear) {
+                run.iter().for_each(|&f| stands[f] = true);
+            }
+        }
+    }
+    settle(&mut stands, fps, loop_mode);
+    stands
+}
+
+/// Height that a path is below in only a few frames.
+fn floor_level(path: &[Vector3<f64>]) -> f64 {
+    let mut heights: Vec<f64> = path.iter().map(|p| p.z).collect();
+    heights.sort_by(f64::total_cmp);
+    let at = (heights.len().saturating_sub(1) as f64 * FLOOR_QUANTILE).round();
+    heights.get(at as usize).copied().unwrap_or(0.0)
+}
+
+/// How surely a point stands in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Clear,
+    Fair,
+    Away,
+}
+
+fn states(
+    path: &[Vector3<f64>],
+    floor: f64,
+    fps: f64,
+    leg_length: f64,
+    loop_mode: LoopMode,
+) -> Vec<State> {
+    let steps: Vec<Vector3<f64>> = path.windows(2).map(|w| (w[1] - w[0]) * fps).collect();
+    let heights: Vec<f64> = path.iter().map(|p| p.z - floor).collect();
+    let half = (fps * WINDOW / 2.0).floor() as i64;
+    (0..path.len() as i64)
+        .map(|f| {
+            let reach = half.max(1);
+            let around = window(&steps, f - reach, f + reach, loop_mode);
+            let velocity = around.iter().sum::<Vector3<f64>>() / around.len().max(1) as f64;
+            let around = window_of_frames(&heights, f - half, f + half, loop_mode);
+            let height = around.iter().sum::<f64>() / around.len().max(1) as f64;
+            let within = |level: usize| {
+                velocity.norm() < SPEED[level] * leg_length && height < HEIGHT[level] * leg_length
+            };
+            match (within(0), within(1)) {
+                (true, _) => State::Clear,
+                (false, true) => State::Fair,
+                _ => State::Away,
+            }
+        })
+        .collect()
+}
+
+/// Items `from..to` of a sequence that repeats, or that is cut at its ends.
+fn window<T: Copy>(items: &[T], from: i64, to: i64, loop_mode: LoopMode) -> Vec<T> {
+    let count = items.len() as i64;
+    let at = |i: i64| match loop_mode {
+        LoopMode::Wrap if count > 0 => usize::try_from(i.rem_euclid(count)).ok(),
+        _ => usize::try_from(i).ok(),
+    };
+    (from..to)
+        .filter_map(at)
+        .filter_map(|i| items.get(i).copied())
+        .collect()
+}
+
+/// Frames `from..=to`, where the last frame of a wrapping motion is the first.
+fn window_of_frames(frames: &[f64], from: i64, to: i64, loop_mode: LoopMode) -> Vec<f64> {
+    let distinct = match loop_mode {
+        LoopMode::Wrap => &frames[..frames.len().saturating_sub(1).max(1)],
+        LoopMode::Clamp => frames,
+    };
+    window(distinct, from, to + 1, loop_mode)
+}
+
+/// Maximal runs of frames that satisfy `is`; in a wrapping motion a run may pass over the seam.
+fn runs<T>(items: &[T], loop_mode: LoopMode, is: impl Fn(&T) -> bool) -> Vec<Vec<usize>> {
+    let mut runs: Vec<Vec<usize>> = Vec::new();
+    let mut open = false;
+    for (index, item) in items.iter().enumerate() {
+        let now = is(item);
+        match (open, now, runs.last_mut()) {
+            (true, true, Some(run)) => run.push(index),
+            (_, true, _) => runs.push(vec![index]),
+            _ => {}
+        }
+        open = now;
+    }
+    let seam = loop_mode == LoopMode::Wrap && runs.len() > 1;
+    let starts = runs.first().is_some_and(|r| r[0] == 0);
+    let ends = runs
+        .last()
+        .is_some_and(|r| r.last() == Some(&(items.len() - 1)));
+    if seam && starts && ends {
+        let mut tail = runs.pop().unwrap_or_default();
+        tail.append(&mut runs[0]);
+        runs[0] = tail;
+    }
+    runs
+}
+
+/// Closes gaps and then drops stances that are too short. Those cut off by an end of the motion stay.
+fn settle(stands: &mut [bool], fps: f64, loop_mode: LoopMode) {
+    let shortest = (SHORTEST * fps).round() as usize;
+    let last = stands.len().saturating_sub(1);
+    for state in [false, true] {
+        for run in runs(stands, loop_mode, |s| *s == state) {
+            // The first and last frame of a wrapping motion are one moment.
+            let passes_seam = run.contains(&0) && run.contains(&last);
+            let whole_motion = run.len() == stands.len();
+            let moments = run.len() - usize::from(passes_seam && !whole_motion);
+            let cut = loop_mode == LoopMode::Clamp && (run.contains(&0) || run.contains(&last));
+            if moments < shortest && !cut && !whole_motion {
+                run.iter().for_each(|&f| stands[f] = !state);
+            }
+        }
+    }
+}

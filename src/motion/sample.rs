@@ -1,0 +1,110 @@
+//! A motion between its frames and beyond its ends.
+
+use super::Motion;
+use super::velocity::{blend, moved, turned};
+use crate::clip::LoopMode;
+use crate::skeleton::Skeleton;
+use nalgebra::{Isometry3, Translation3};
+
+/// Where a time falls: between two frames of one cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Cycle number, 0 for the first; negative before it.
+    pub cycle: i64,
+    pub frame: usize,
+    /// The frame after it, at most the last.
+    pub next: usize,
+    /// 0 at `frame`, 1 at `next`.
+    pub blend: f64,
+}
+
+impl Motion {
+    /// Frames around `time` seconds. A wrapping motion goes on for ever in both directions; one that ends holds
+    /// its first and last frame.
+    pub fn moment(&self, time: f64) -> Moment {
+        let last = self.qpos.len().saturating_sub(1);
+        let position = if time.is_finite() {
+            time * self.fps
+        } else {
+            0.0
+        };
+        let (cycle, within) = match self.loop_mode {
+            LoopMode::Wrap if last > 0 => {
+                let period = last as f64;
+                let cycle = (position / period).floor();
+                (cycle as i64, position - cycle * period)
+            }
+            _ => (0, position),
+        };
+        let within = within.clamp(0.0, last as f64);
+        let frame = (within as usize).min(last);
+        Moment {
+            cycle,
+            frame,
+            next: (frame + 1).min(last),
+            blend: within - frame as f64,
+        }
+    }
+
+    /// Phase at `time`: 0 to 1 over the motion or its cycle.
+    pub fn sample_phase(&self, time: f64) -> f64 {
+        let m = self.moment(time);
+        let at = |f: usize| self.tracks.phase.get(f).copied().unwrap_or(0.0);
+        at(m.frame) + (at(m.next) - at(m.frame)) * m.blend
+    }
+
+    /// `qpos` at `time`, in world coordinates of the first cycle's start.
+    ///
+    /// # Panics
+    /// If the motion has no frames or was made for another skeleton (see [`Motion::check_skeleton`]).
+    pub fn sample_qpos(&self, skeleton: &Skeleton, time: f64) -> Vec<f64> {
+        let m = self.moment(time);
+        let qpos = skeleton.interpolate(&self.qpos[m.frame], &self.qpos[m.next], m.blend);
+        match m.cycle {
+            0 => qpos,
+            n => moved(&qpos, &self.cycle_offset(n)),
+        }
+    }
+
+    /// `qvel` at `time`: linear between frames; zero where a motion that ends is held.
+    ///
+    /// # Panics
+    /// If the motion has no frames.
+    pub fn sample_qvel(&self, time: f64) -> Vec<f64> {
+        let held = self.loop_mode == LoopMode::Clamp && !(0.0..=self.duration()).contains(&time);
+        if held {
+            return vec![0.0; self.qvel[0].len()];
+        }
+        let m = self.moment(time);
+        let qvel = blend(&self.qvel[m.frame], &self.qvel[m.next], m.blend);
+        match m.cycle {
+            0 => qvel,
+            n => turned(&qvel, &self.cycle_offset(n).rotation),
+        }
+    }
+
+    /// World poses of all bodies at `time`, each interpolated on its own.
+    ///
+    /// # Panics
+    /// If the motion has no frames.
+    pub fn sample_bodies(&self, time: f64) -> Vec<Isometry3<f64>> {
+        let m = self.moment(time);
+        let offset = self.cycle_offset(m.cycle);
+        let pairs = self.bodies[m.frame].iter().zip(&self.bodies[m.next]);
+        pairs
+            .map(|(a, b)| {
+                let shift = a.translation.vector.lerp(&b.translation.vector, m.blend);
+                let turn = (a.rotation.inverse() * b.rotation).powf(m.blend);
+                offset * Isometry3::from_parts(Translation3::from(shift), a.rotation * turn)
+            })
+            .collect()
+    }
+
+    /// Whether contact body `c` stands at `time`: as in the nearer frame.
+    pub fn sample_contact(&self, c: usize, time: f64) -> bool {
+        let m = self.moment(time);
+        let frame = if m.blend < 0.5 { m.frame } else { m.next };
+        let row = self.tracks.contact.get(frame);
+        row.and_then(|r| r.get(c)).copied().unwrap_or(false)
+    }
+}

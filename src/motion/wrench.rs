@@ -1,0 +1,176 @@
+//! The part of a motion that its contacts can't explain.
+//!
+//! Newton and Euler about the centre of mass: the ground has to supply F = m (c̈ − g) and τ = dL/dt. Contacts supply
+//! forces inside friction cones at the points on which bodies stand. What is left would need a hand from nowhere:
+//! the root wrench residual (residual forces of Yuan and Kitani, NeurIPS 2020; root residuals of OpenSim's RRA).
+
+use super::nnls;
+use super::timeline::Timeline;
+use crate::skeleton::Skeleton;
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3, Vector6};
+
+/// Earth's standard gravity as MuJoCo's default has it, m/s².
+const GRAVITY: f64 = 9.81;
+/// Half width of the window in which accelerations are fitted, s.
+const SMOOTHING: f64 = 0.05;
+/// Points of a body this close to its lowest one can carry load, in leg lengths.
+const SOLE: f64 = 0.03;
+
+/// Force (N) and moment about the centre of mass (N·m), world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Wrench {
+    pub(crate) force: Vector3<f64>,
+    pub(crate) moment: Vector3<f64>,
+}
+
+/// Which bodies stand on the ground.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Standing<'a> {
+    pub(crate) bodies: &'a [usize],
+    /// `contact[f][c]`: whether `bodies[c]` stands at frame `f`.
+    pub(crate) contact: &'a [Vec<bool>],
+}
+
+/// What the world besides gravity has to supply in every frame.
+///
+/// Derivatives are those of a quadratic fitted by least squares to the frames within 0.05 s (Savitzky and
+/// Golay, Analytical Chemistry 36, 1964).
+pub(crate) fn required(
+    com: &[Vector3<f64>],
+    angular_momentum: &[Vector3<f64>],
+    mass: f64,
+    fps: f64,
+    timeline: &Timeline,
+) -> Vec<Wrench> {
+    let offset = |n| timeline.cycle.offset(n);
+    (0..com.len())
+        .map(|f| {
+            let position = |n, at: usize| (offset(n) * nalgebra::Point3::from(com[at])).coords;
+            let spin = |n, at: usize| offset(n).rotation * angular_momentum[at];
+            let (_, acceleration) = derivatives(f, fps, timeline, position);
+            let (spin_rate, _) = derivatives(f, fps, timeline, spin);
+            Wrench {
+                force: (acceleration + Vector3::z() * GRAVITY) * mass,
+                moment: spin_rate,
+            }
+        })
+        .collect()
+}
+
+/// Frames on each side of the fitting window.
+fn reach(fps: f64) -> usize {
+    (SMOOTHING * fps).round().max(1.0) as usize
+}
+
+/// First and second time derivative at `frame` of the quadratic through its window.
+fn derivatives(
+    frame: usize,
+    fps: f64,
+    timeline: &Timeline,
+    value: impl Fn(i64, usize) -> Vector3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let mut normal = Matrix3::zeros();
+    let mut moments = Matrix3::zeros();
+    for index in timeline.window(frame, reach(fps)) {
+        let Some((cycle, at)) = timeline.locate(index) else {
+            continue;
+        };
+        let t = index as f64 - frame as f64;
+        let powers = Vector3::new(1.0, t, t * t);
+        normal += powers * powers.transpose();
+        moments += powers * value(cycle, at).transpose();
+    }
+    match normal.try_inverse() {
+        Some(inverse) => {
+            let fit = inverse * moments;
+            let row = |i: usize| fit.row(i).transpose();
+            (row(1) * fps, row(2) * 2.0 * fps * fps)
+        }
+        None => (Vector3::zeros(), Vector3::zeros()),
+    }
+}
+
+/// Residual force (N) and moment about the root body's origin (N·m) in every frame, world axes.
+///
+/// Bodies count as standing if they do so within the window in which `required` was fitted, because its
+/// loads are those of the whole window.
+pub(crate) fn residual(
+    skeleton: &Skeleton,
+    bodies: &[Vec<Isometry3<f64>>],
+    com: &[Vector3<f64>],
+    required: &[Wrench],
+    standing: &Standing,
+    fps: f64,
+    timeline: &Timeline,
+) -> Vec<Vector6<f64>> {
+    let leg = skeleton.leg_length();
+    (0..bodies.len())
+        .map(|f| {
+            let stands = |c: usize| {
+                timeline
+                    .window(f, reach(fps))
+                    .filter_map(|i| timeline.locate(i))
+                    .any(|(_, at)| standing.contact[at][c])
+            };
+            let feet = standing.bodies.iter().enumerate();
+            let rays: Vec<Wrench> = feet
+                .filter(|(c, _)| stands(*c))
+                .flat_map(|(_, &body)| friction_rays(skeleton, &bodies[f], body, leg, &com[f]))
+                .collect();
+            let left = unexplained(&required[f], &rays, leg);
+            let arm = com[f] - bodies[f][0].translation.vector;
+            let moment = left.moment + arm.cross(&left.force);
+            Vector6::from_iterator(left.force.iter().chain(moment.iter()).copied())
+        })
+        .collect()
+}
+
+/// Edge forces of the friction pyramids under one body, of 1 N upwards each, with their moments about `com`.
+fn friction_rays(
+    skeleton: &Skeleton,
+    poses: &[Isometry3<f64>],
+    body: usize,
+    leg_length: f64,
+    com: &Vector3<f64>,
+) -> Vec<Wrench> {
+    let friction = skeleton.bodies[body].friction;
+    let lowest = skeleton.lowest_point_of(poses, &[body]);
+    let points = skeleton.ground_points(poses, body);
+    let sole = points.iter().filter(|p| p.z <= lowest + SOLE * leg_length);
+    let edges = [
+        Vector3::new(friction, 0.0, 1.0),
+        Vector3::new(-friction, 0.0, 1.0),
+        Vector3::new(0.0, friction, 1.0),
+        Vector3::new(0.0, -friction, 1.0),
+    ];
+    sole.flat_map(|point| {
+        edges.map(|force| Wrench {
+            force,
+            moment: (point - com).cross(&force),
+        })
+    })
+    .collect()
+}
+
+/// What remains of `required` when the rays, each with a weight of at least zero, explain all they can; moments
+/// count in newtons at a leg's length.
+fn unexplained(required: &Wrench, rays: &[Wrench], leg_length: f64) -> Wrench {
+    let length = leg_length.max(1e-3);
+    let column = |w: &Wrench| {
+        Vector6::from_iterator(
+            w.force
+                .iter()
+                .copied()
+                .chain((w.moment / length).iter().copied()),
+        )
+    };
+    let target = column(required);
+    let columns: Vec<Vector6<f64>> = rays.iter().map(column).collect();
+    let a = DMatrix::from_fn(6, columns.len(), |row, j| columns[j][row]);
+    let b = DVector::from_column_slice(target.as_slice());
+    let left = &b - &a * nnls::solve(&a, &b);
+    Wrench {
+        force: Vector3::new(left[0], left[1], left[2]),
+        moment: Vector3::new(left[3], left[4], left[5]) * length,
+    }
+}

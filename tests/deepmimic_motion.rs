@@ -1,0 +1,98 @@
+//! Tracks of recorded motions whose character has the humanoid's own proportions, so that no retargeting comes between.
+
+use mimic::clip::LoopMode;
+use mimic::motion::{Cycle, Draft, Motion};
+use mimic::skeleton::Skeleton;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// The clips' bodies in order after the root, and whether their rotation is a hinge angle.
+const JOINTS: [(&str, bool); 12] = [
+    ("torso", false),
+    ("head", false),
+    ("right_thigh", false),
+    ("right_shin", true),
+    ("right_foot", false),
+    ("right_upper_arm", false),
+    ("right_lower_arm", true),
+    ("left_thigh", false),
+    ("left_shin", true),
+    ("left_foot", false),
+    ("left_upper_arm", false),
+    ("left_lower_arm", true),
+];
+
+/// Y up and Z right to Z up and Y left.
+fn rotation(q: &[f64]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], -q[3], q[2]))
+}
+
+fn frame(skeleton: &Skeleton, row: &[f64], near: Option<&[f64]>) -> Vec<f64> {
+    let position = Translation3::new(row[1], -row[3], row[2]);
+    let root = Isometry3::from_parts(position, rotation(&row[4..8]));
+    let mut rotations = vec![UnitQuaternion::identity(); skeleton.bodies.len()];
+    let mut at = 8;
+    for (name, hinge) in JOINTS {
+        let body = skeleton.bodies.iter().position(|b| b.name == name);
+        let body = body.unwrap_or_else(|| panic!("the humanoid has a body `{name}`"));
+        rotations[body] = if hinge {
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -row[at])
+        } else {
+            rotation(&row[at..at + 4])
+        };
+        at += if hinge { 1 } else { 4 };
+    }
+    skeleton.rotations_to_qpos(&root, &rotations, near)
+}
+
+/// `None`, with a message, where the clip is not there.
+fn motion(clip: &str) -> Option<(Skeleton, Motion)> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/deepmimic");
+    let path = Path::new(folder).join(format!("humanoid3d_{clip}.txt"));
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("skipped: {} is not there", path.display());
+        return None;
+    };
+    let json: serde_json::Value = serde_json::from_str(&text).expect("the clip is JSON");
+    let rows: Vec<Vec<f64>> = serde_json::from_value(json["Frames"].clone()).expect("has frames");
+    let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+    let mut qpos: Vec<Vec<f64>> = Vec::new();
+    for row in &rows {
+        qpos.push(frame(&skeleton, row, qpos.last().map(Vec::as_slice)));
+    }
+    let wrap = json["Loop"] == "wrap";
+    let (first, last) = (&qpos[0], &qpos[qpos.len() - 1]);
+    let travel = Vector3::new(last[0] - first[0], last[1] - first[1], 0.0);
+    let feet = ["right_foot", "left_foot"];
+    let body = |name: &str| skeleton.bodies.iter().position(|b| b.name == name);
+    let draft = Draft {
+        name: clip.into(),
+        fps: 1.0 / rows[0][0],
+        loop_mode: if wrap { LoopMode::Wrap } else { LoopMode::Clamp },
+        cycle: Cycle {
+            translation: if wrap { travel } else { Vector3::zeros() },
+            heading: 0.0,
+        },
+        qpos,
+        contact_bodies: feet.iter().filter_map(|n| body(n)).collect(),
+        contact: None,
+        report: serde_json::Value::Null,
+    };
+    Some((skeleton.clone(), Motion::from_poses(&skeleton, draft)))
+}
+
+#[test]
+fn print() {
+    for clip in ["walk","run","jog","kick","spinkick","backflip","jump","cartwheel","dance_a","punch"] {
+        let Some((s, m)) = motion(clip) else { return };
+        let weight = s.total_mass() * 9.81;
+        for c in 0..2 {
+            println!("{clip} {c} {}", m.tracks.contact.iter().map(|r| if r[c] {'#'} else {'.'}).collect::<String>());
+        }
+        let low: Vec<f64> = m.bodies.iter().map(|p| s.lowest_point(p)).collect();
+        println!("lowest {:.3} {:.3}", low.iter().copied().fold(9.0, f64::min), low.iter().copied().fold(-9.0, f64::max));
+        let f: Vec<f64> = m.tracks.root_wrench_residual.iter().map(|w| w.fixed_rows::<3>(0).norm()/weight).collect();
+        let t: Vec<f64> = m.tracks.root_wrench_residual.iter().map(|w| w.fixed_rows::<3>(3).norm()).collect();
+        println!("residual force/weight mean {:.3} max {:.3}; moment mean {:.1} max {:.1} Nm", f.iter().sum::<f64>()/f.len() as f64, f.iter().copied().fold(0.0, f64::max), t.iter().sum::<f64>()/t.len() as f64, t.iter().copied().fold(0.0, f64::max));
+    }
+}
