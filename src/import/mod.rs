@@ -10,6 +10,7 @@ mod detect;
 mod error;
 mod facing;
 mod rigid;
+pub(crate) mod fbx;
 mod scene;
 mod seam;
 mod take;

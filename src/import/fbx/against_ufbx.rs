@@ -1,0 +1,192 @@
+//! Every node of every frame of every take of real files, against `ufbx`.
+
+use super::{FbxScene, read};
+use crate::import::scene::Scene;
+use nalgebra::{Matrix4, Vector3};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
+const TOLERANCE_M: f64 = 1e-4;
+const TOLERANCE_LINEAR: f64 = 1e-5;
+
+/// Matrices of a file's nodes by their path and, where paths repeat, by the order of the nodes in the file.
+type Worlds = BTreeMap<(String, usize), Matrix4<f64>>;
+
+fn collect(nodes: impl Iterator<Item = (String, Matrix4<f64>)>) -> Worlds {
+    let mut seen = BTreeMap::<String, usize>::new();
+    let keyed = nodes.map(|(path, matrix)| {
+        let count = seen.entry(path.clone()).or_default();
+        *count += 1;
+        ((path, *count), matrix)
+    });
+    keyed.collect()
+}
+
+fn ours(scene: &FbxScene, at: Option<(usize, f64)>) -> Worlds {
+    let mut paths: Vec<String> = Vec::new();
+    for node in scene.nodes() {
+        let parent = node.parent.map_or("", |parent| paths[parent].as_str());
+        paths.push(format!("{parent}/{}", node.name));
+    }
+    collect(paths.into_iter().zip(scene.world(at)))
+}
+
+fn path(node: &ufbx::Node) -> String {
+    let parent = node
+        .parent
+        .as_ref()
+        .filter(|parent| !parent.is_root)
+        .map_or_else(String::new, |parent| path(parent));
+    format!("{parent}/{}", &*node.element.name)
+}
+
+fn theirs(scene: &ufbx::Scene) -> Worlds {
+    let mut nodes: Vec<&ufbx::Node> = scene
+        .nodes
+        .into_iter()
+        .filter(|node| !node.is_root)
+        .collect();
+    nodes.sort_by_key(|node| node.element.element_id);
+    collect(
+        nodes
+            .into_iter()
+            .map(|node| (path(node), matrix(&node.node_to_world))),
+    )
+}
+
+#[rustfmt::skip]
+fn matrix(m: &ufbx::Matrix) -> Matrix4<f64> {
+    Matrix4::new(
+        m.m00, m.m01, m.m02, m.m03,
+        m.m10, m.m11, m.m12, m.m13,
+        m.m20, m.m21, m.m22, m.m23,
+        0.0, 0.0, 0.0, 1.0,
+    )
+}
+
+/// Largest distance in metres, and largest difference of the linear parts relative to their size.
+fn compare(ours: &Worlds, theirs: &Worlds, unit_m: f64, place: &str) -> (f64, f64) {
+    let names = |worlds: &Worlds| worlds.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(ours), names(theirs), "{place}: different nodes");
+    let mut worst = (0.0f64, 0.0f64);
+    for (key, theirs) in theirs {
+        let ours = ours[key];
+        let origin = |m: &Matrix4<f64>| Vector3::from(m.fixed_view::<3, 1>(0, 3));
+        let linear = |m: &Matrix4<f64>| m.fixed_view::<3, 3>(0, 0).into_owned();
+        let distance = (origin(&ours) - origin(theirs)).norm() * unit_m;
+        let skew = (linear(&ours) - linear(theirs)).norm() / linear(theirs).norm().max(1.0);
+        assert!(
+            distance < TOLERANCE_M,
+            "{place}, node {key:?}: {distance} m apart"
+        );
+        assert!(
+            skew < TOLERANCE_LINEAR,
+            "{place}, node {key:?}: axes differ by {skew}"
+        );
+        worst = (worst.0.max(distance), worst.1.max(skew));
+    }
+    worst
+}
+
+fn check(file: &str) {
+    let Ok(bytes) = std::fs::read(Path::new(DATA).join(file)) else {
+        eprintln!("skipped: {file} isn't there");
+        return;
+    };
+    let scene = read(&bytes).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let options = ufbx::LoadOpts {
+        ignore_geometry: true,
+        ..Default::default()
+    };
+    let oracle = ufbx::load_memory(&bytes, options).expect("ufbx reads the file");
+    let mut worst = compare(
+        &ours(&scene, None),
+        &theirs(&oracle),
+        scene.unit_m(),
+        &format!("{file} at rest"),
+    );
+    assert_eq!(
+        scene.takes().len(),
+        oracle.anim_stacks.len(),
+        "{file}: different takes"
+    );
+    let mut frames = 0;
+    for (index, stack) in (&oracle.anim_stacks).into_iter().enumerate() {
+        let take = &scene.takes()[index];
+        assert_eq!(take.name, &*stack.element.name);
+        if stack.time_end > stack.time_begin {
+            assert_eq!(
+                (take.start, take.end),
+                (stack.time_begin, stack.time_end),
+                "{file}: span of {}",
+                take.name
+            );
+        }
+        for frame in 0..=((take.end - take.start) * take.fps).round() as usize {
+            let time = take.start + frame as f64 / take.fps;
+            // The oracle isn't told to take times to the nearest tick.
+            let ticks = oracle.metadata.ktime_second as f64;
+            let snapped = (time * ticks).round() / ticks;
+            let evaluated = ufbx::evaluate_scene(&oracle, &stack.anim, snapped, Default::default())
+                .expect("ufbx evaluates");
+            let place = format!("{file}, take {}, frame {frame}", take.name);
+            let found = compare(
+                &ours(&scene, Some((index, time))),
+                &theirs(&evaluated),
+                scene.unit_m(),
+                &place,
+            );
+            worst = (worst.0.max(found.0), worst.1.max(found.1));
+            frames += 1;
+        }
+    }
+    eprintln!(
+        "{file}: {} nodes, {frames} frames, {:.2e} mm, axes {:.2e}",
+        scene.nodes().len(),
+        worst.0 * 1e3,
+        worst.1
+    );
+}
+
+macro_rules! files {
+    ($($name:ident: $($file:literal),+;)+) => {
+        $(#[test] fn $name() { $(check($file);)+ })+
+    };
+}
+
+files! {
+    mixamo_marathon_man_mma_kick: "mixamo/MarathonManMMAKick.fbx";
+    mixamo_locomotion_walking: "mixamo/locomotion-pack/walking.fbx";
+    mixamo_marathon_man_backflip: "mixamo/MarathonManBackflip.fbx";
+    mixamo_marathon_man_jazz_dancing: "mixamo/MarathonManJazzDancing.fbx";
+    mixamo_marathon_man_punching_bag: "mixamo/MarathonManPunchingBag.fbx";
+    mixamo_marathon_man_running: "mixamo/MarathonManRunning.fbx";
+    mixamo_marathon_man_walking: "mixamo/MarathonManWalking.fbx";
+    mixamo_samba_dancing: "mixamo/Samba-Dancing.fbx";
+    mixamo_chapa_giratoria: "mixamo/Chapa-Giratoria.fbx";
+    mixamo_locomotion_idle: "mixamo/locomotion-pack/idle.fbx";
+    mixamo_locomotion_jump: "mixamo/locomotion-pack/jump.fbx";
+    mixamo_locomotion_running: "mixamo/locomotion-pack/running.fbx";
+    mixamo_locomotion_strafes: "mixamo/locomotion-pack/left-strafe.fbx", "mixamo/locomotion-pack/right-strafe-walking.fbx";
+    mixamo_locomotion_turns: "mixamo/locomotion-pack/left-turn-90.fbx", "mixamo/locomotion-pack/right-turn.fbx";
+    cmu_07_01: "cmu/07_01_cmu.fbx";
+    cmu_49_08: "cmu/49_08_cmu.fbx";
+    cmu_91: "cmu/91_48.fbx", "cmu/91_50.fbx", "cmu/91_53.fbx";
+    torture_animation_space_y_up_cm: "torture-fbx/animation-space-y-up-cm.fbx";
+    torture_animation_space_z_up_m: "torture-fbx/animation-space-z-up-m.fbx";
+    torture_animation_with_skeleton: "torture-fbx/animation_with_skeleton.fbx";
+    torture_blender_279_sausage: "torture-fbx/blender_279_sausage_7400_binary.fbx";
+    torture_blender_293_barbarian: "torture-fbx/blender_293_barbarian_7400_binary.fbx";
+    torture_blender_340_z_up: "torture-fbx/blender_340_z_up_7400_binary.fbx";
+    torture_max_transformed_skin: "torture-fbx/max_transformed_skin_7500_binary.fbx";
+    torture_maya_anim_interpolation: "torture-fbx/maya_anim_interpolation_7700_binary.fbx";
+    torture_maya_anim_layers: "torture-fbx/maya_anim_layers_7500_binary.fbx";
+    torture_maya_game_sausage: "torture-fbx/maya_game_sausage_7500_binary_combined.fbx";
+    torture_maya_human_ik: "torture-fbx/maya_human_ik_7400_binary.fbx";
+    torture_maya_kenney_character: "torture-fbx/maya_kenney_character_7700_binary.fbx";
+    torture_maya_pivots: "torture-fbx/maya_pivots_7500_binary.fbx";
+    torture_maya_resampled: "torture-fbx/maya_resampled_7500_binary.fbx";
+    torture_maya_rotation_order: "torture-fbx/maya_rotation_order_7500_binary.fbx";
+    torture_maya_tangent_sign: "torture-fbx/maya_tangent_sign_7700_binary.fbx";
+}

@@ -1,0 +1,451 @@
+//! Animation curves: keys read from the file, and values between and beyond them.
+
+use super::document::{Array, Element};
+use super::tangent::{Attribute, Step, THIRD, slopes};
+use std::iter::repeat_n;
+
+const CONSTANT: u32 = 0x2;
+const CUBIC: u32 = 0x8;
+const CONSTANT_NEXT: u32 = 0x100;
+/// Attribute of keys in files that give none.
+const LINEAR: Attribute = Attribute {
+    flags: 0x4,
+    data: [0; 4],
+};
+
+#[derive(Clone, Copy, Debug)]
+struct Key {
+    tick: f64,
+    value: f64,
+    /// How the curve runs from this key to the next.
+    segment: Segment,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Segment {
+    Hold,
+    HoldNext,
+    Line,
+    Cubic { leave: Handle, arrive: Handle },
+}
+
+/// A Bezier handle, seen from its key towards the inside of the segment.
+#[derive(Clone, Copy, Debug)]
+struct Handle {
+    /// Fraction of the segment's time.
+    weight: f64,
+    /// Value of the curve that the tangent gains over the handle's time, in the direction of time.
+    rise: f64,
+}
+
+/// What a curve does before its first or after its last key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Beyond {
+    Hold,
+    Slope,
+    Cycle {
+        repeats: Option<f64>,
+        mirror: bool,
+        climb: bool,
+    },
+}
+
+/// One animation curve. It has at least one key.
+#[derive(Clone, Debug)]
+pub(super) struct Curve {
+    keys: Vec<Key>,
+    before: Beyond,
+    after: Beyond,
+    /// Keys were out of order or not finite.
+    pub mended: bool,
+}
+
+struct RawKey {
+    tick: f64,
+    value: f64,
+    attribute: Attribute,
+}
+
+impl Curve {
+    /// Reads an `AnimationCurve`; `None` where it has no keys. `ticks` is the number of ticks per second.
+    pub fn read(
+        record: &Element,
+        ticks: f64,
+        budget: &mut usize,
+    ) -> Result<Option<Self>, &'static str> {
+        let (mut raw, mut mended) = (raw_keys(record, budget)?, false);
+        let count = raw.len();
+        raw.retain(|key| super::in_range(key.value));
+        mended |= raw.len() != count;
+        if !raw.is_sorted_by(|a, b| a.tick <= b.tick) {
+            raw.sort_by(|a, b| a.tick.total_cmp(&b.tick));
+            mended = true;
+        }
+        let beyond = |name| record.child(name).map_or(Beyond::Hold, beyond);
+        Ok((!raw.is_empty()).then(|| Self {
+            keys: keys(&raw, ticks),
+            before: beyond("Pre-Extrapolation"),
+            after: beyond("Post-Extrapolation"),
+            mended,
+        }))
+    }
+
+    /// Ticks of the first and the last key.
+    pub fn ends(&self) -> (f64, f64) {
+        let tick = |key: Option<&Key>| key.map_or(0.0, |key| key.tick);
+        (tick(self.keys.first()), tick(self.keys.last()))
+    }
+
+    /// Ticks between neighbouring keys.
+    pub fn spacings(&self) -> impl Iterator<Item = f64> + '_ {
+        self.keys.windows(2).map(|pair| pair[1].tick - pair[0].tick)
+    }
+
+    /// Whether not all keys within `start..=end` have the same value.
+    pub fn varies(&self, start: f64, end: f64) -> bool {
+        let mut inside = self
+            .keys
+            .iter()
+            .filter(|key| (start..=end).contains(&key.tick))
+            .map(|key| key.value);
+        let first = inside.next();
+        inside.any(|value| Some(value) != first) || self.value(start) != self.value(end)
+    }
+
+    /// The curve's value at `tick`.
+    pub fn value(&self, tick: f64) -> f64 {
+        let [first, .., last] = self.keys.as_slice() else {
+            return self.keys.first().map_or(0.0, |key| key.value);
+        };
+        if tick < first.tick {
+            self.beyond(self.before, first, self.start_slope(), tick)
+        } else if tick > last.tick {
+            self.beyond(self.after, last, self.end_slope(), tick)
+        } else {
+            self.inside(tick)
+        }
+    }
+
+    fn inside(&self, tick: f64) -> f64 {
+        let at = self.segment_at(tick);
+        let (Some(key), next) = (self.keys.get(at), self.keys.get(at + 1)) else {
+            return 0.0;
+        };
+        match next {
+            Some(next) if tick > key.tick => between(key, next, tick),
+            _ => key.value,
+        }
+    }
+
+    /// Index of the last key that isn't after `tick`. Baked curves have even keys: there the guess is the answer.
+    fn segment_at(&self, tick: f64) -> usize {
+        let last = self.keys.len() - 1;
+        let (start, end) = (self.keys[0].tick, self.keys[last].tick);
+        let guess = (((tick - start) / (end - start) * last as f64) as usize).min(last);
+        let holds = |at: usize| {
+            self.keys[at].tick <= tick && self.keys.get(at + 1).is_none_or(|next| tick < next.tick)
+        };
+        if holds(guess) {
+            return guess;
+        }
+        self.keys
+            .partition_point(|key| key.tick <= tick)
+            .saturating_sub(1)
+    }
+
+    fn beyond(&self, beyond: Beyond, edge: &Key, slope: f64, tick: f64) -> f64 {
+        match beyond {
+            Beyond::Hold => edge.value,
+            Beyond::Slope => edge.value + slope * (tick - edge.tick),
+            Beyond::Cycle {
+                repeats,
+                mirror,
+                climb,
+            } => self.cycle(tick, repeats, mirror, climb),
+        }
+    }
+
+    /// Value at a tick outside the keys when the curve repeats there.
+    fn cycle(&self, tick: f64, repeats: Option<f64>, mirror: bool, climb: bool) -> f64 {
+        let [first, .., last] = self.keys.as_slice() else {
+            return 0.0;
+        };
+        let length = last.tick - first.tick;
+        let forward = tick > last.tick;
+        let edge = if forward { last } else { first };
+        if length < 1.0 || repeats == Some(0.0) {
+            return edge.value;
+        }
+        let outside = if forward {
+            tick - last.tick
+        } else {
+            first.tick - tick
+        };
+        let mut turn = (outside / length).floor();
+        let mut rest = outside - turn * length;
+        if let Some(repeats) = repeats.filter(|&repeats| turn >= repeats) {
+            (turn, rest) = (repeats - 1.0, length);
+        }
+        if mirror && turn % 2.0 == 0.0 {
+            rest = length - rest;
+        }
+        let from_start = if forward { rest } else { length - rest };
+        let climbed = if climb {
+            (last.value - first.value) * (turn + 1.0)
+        } else {
+            0.0
+        };
+        self.inside(first.tick + from_start) + if forward { climbed } else { -climbed }
+    }
+
+    /// Units per tick at the first key.
+    fn start_slope(&self) -> f64 {
+        match self.keys.as_slice() {
+            [key, next, ..] => leaving_slope(key, next),
+            _ => 0.0,
+        }
+    }
+
+    /// Units per tick at the last key.
+    fn end_slope(&self) -> f64 {
+        match self.keys.as_slice() {
+            [.., key, next] => arriving_slope(key, next),
+            _ => 0.0,
+        }
+    }
+}
+
+fn leaving_slope(key: &Key, next: &Key) -> f64 {
+    let length = next.tick - key.tick;
+    match key.segment {
+        Segment::Cubic { leave, .. } => ratio(leave.rise, leave.weight * length),
+        Segment::Line => ratio(next.value - key.value, length),
+        _ => 0.0,
+    }
+}
+
+fn arriving_slope(key: &Key, next: &Key) -> f64 {
+    let length = next.tick - key.tick;
+    match key.segment {
+        Segment::Cubic { arrive, .. } => ratio(arrive.rise, arrive.weight * length),
+        Segment::Line => ratio(next.value - key.value, length),
+        _ => 0.0,
+    }
+}
+
+fn ratio(rise: f64, run: f64) -> f64 {
+    if run > 0.0 { rise / run } else { 0.0 }
+}
+
+/// The curve at `tick`, which lies after `key` and before `next`.
+fn between(key: &Key, next: &Key, tick: f64) -> f64 {
+    let s = (tick - key.tick) / (next.tick - key.tick);
+    match key.segment {
+        Segment::Hold => key.value,
+        Segment::HoldNext => next.value,
+        Segment::Line => key.value * (1.0 - s) + next.value * s,
+        Segment::Cubic { leave, arrive } => {
+            let t = bezier_parameter(leave.weight, 1.0 - arrive.weight, s);
+            let controls = [
+                key.value,
+                key.value + leave.rise,
+                next.value - arrive.rise,
+                next.value,
+            ];
+            bernstein(controls, t)
+        }
+    }
+}
+
+fn bernstein([p0, p1, p2, p3]: [f64; 4], t: f64) -> f64 {
+    let u = 1.0 - t;
+    u * u * u * p0 + 3.0 * u * t * (u * p1 + t * p2) + t * t * t * p3
+}
+
+/// Parameter at which a Bezier curve with controls 0, `x1`, `x2`, 1 reaches `x`, by Newton's method kept inside a
+/// shrinking bracket. With both handles at a third, parameter and time are the same.
+fn bezier_parameter(x1: f64, x2: f64, x: f64) -> f64 {
+    if x1 == THIRD && x2 == 1.0 - THIRD {
+        return x;
+    }
+    let (mut low, mut high, mut t) = (0.0, 1.0, x);
+    for _ in 0..60 {
+        let error = bernstein([0.0, x1, x2, 1.0], t) - x;
+        if error.abs() < 1e-15 {
+            break;
+        }
+        if error > 0.0 {
+            high = t
+        } else {
+            low = t
+        }
+        let u = 1.0 - t;
+        let speed = 3.0 * (u * u * x1 + 2.0 * u * t * (x2 - x1) + t * t * (1.0 - x2));
+        let newton = t - error / speed;
+        t = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+    }
+    t
+}
+
+fn raw_keys(record: &Element, budget: &mut usize) -> Result<Vec<RawKey>, &'static str> {
+    let (Some(times), Some(values)) = (record.array("KeyTime"), record.array("KeyValueFloat"))
+    else {
+        return Ok(Vec::new());
+    };
+    let (times, values) = (times.integers(budget)?, values.reals(budget)?);
+    if times.len() != values.len() {
+        return Err("a curve has different numbers of times and values");
+    }
+    let attributes = attributes(record, times.len(), budget)?;
+    let keys = times.into_iter().zip(values).zip(attributes);
+    Ok(keys
+        .map(|((time, value), attribute)| RawKey {
+            tick: time as f64,
+            value,
+            attribute,
+        })
+        .collect())
+}
+
+/// One attribute per key, from the run-length form of the file.
+fn attributes(
+    record: &Element,
+    count: usize,
+    budget: &mut usize,
+) -> Result<Vec<Attribute>, &'static str> {
+    let find = |name| record.array(name).filter(|_| count > 0);
+    let (Some(flags), Some(data), Some(runs)) = (
+        find("KeyAttrFlags"),
+        find("KeyAttrDataFloat"),
+        find("KeyAttrRefCount"),
+    ) else {
+        return Ok(vec![LINEAR; count]);
+    };
+    let mut read = |array: Array| array.words(budget);
+    let (flags, data, runs) = (read(flags)?, read(data)?, read(runs)?);
+    if flags.len() != runs.len() || data.len() != 4 * runs.len() {
+        return Err("a curve has different numbers of key attributes");
+    }
+    let runs =
+        runs.iter()
+            .zip(flags)
+            .zip(data.chunks_exact(4))
+            .flat_map(|((&run, flags), data)| {
+                repeat_n(
+                    Attribute {
+                        flags,
+                        data: [data[0], data[1], data[2], data[3]],
+                    },
+                    run as usize,
+                )
+            });
+    let attributes: Vec<_> = runs.take(count).collect();
+    if attributes.len() == count {
+        Ok(attributes)
+    } else {
+        Err("a curve has too few key attributes")
+    }
+}
+
+fn keys(raw: &[RawKey], ticks: f64) -> Vec<Key> {
+    let step = |a: &RawKey, b: &RawKey, weight: f64| {
+        let time = (b.tick - a.tick) / ticks;
+        (time > 0.0).then_some(Step {
+            time,
+            rise: b.value - a.value,
+            weight,
+        })
+    };
+    let sides: Vec<_> = (0..raw.len())
+        .map(|i| {
+            let (own, previous) = (&raw[i], i.checked_sub(1).map(|p| &raw[p]));
+            let before = previous.and_then(|p| step(p, own, p.attribute.next_left_weight()));
+            let after = raw
+                .get(i + 1)
+                .and_then(|n| step(own, n, own.attribute.right_weight()));
+            slopes_of(own, previous, before, after)
+        })
+        .collect();
+    (0..raw.len())
+        .map(|i| {
+            let arriving = sides.get(i + 1).map_or(0.0, |side| side.0);
+            let seconds = raw
+                .get(i + 1)
+                .map_or(0.0, |next| (next.tick - raw[i].tick) / ticks);
+            let segment = segment(&raw[i].attribute, sides[i].1, arriving, seconds);
+            Key {
+                tick: raw[i].tick,
+                value: raw[i].value,
+                segment,
+            }
+        })
+        .collect()
+}
+
+/// A key that isn't cubic itself still ends a cubic segment, with the slope that the key before it holds.
+fn slopes_of(
+    own: &RawKey,
+    previous: Option<&RawKey>,
+    before: Option<Step>,
+    after: Option<Step>,
+) -> (f64, f64) {
+    const USER: u32 = 0x400;
+    let mut attribute = own.attribute;
+    if is_constant(&attribute) || !attribute.has(CUBIC) {
+        attribute.flags = USER;
+    }
+    slopes(before, after, previous.map(|key| key.attribute), attribute)
+}
+
+fn is_constant(attribute: &Attribute) -> bool {
+    attribute.has(CONSTANT)
+}
+
+fn segment(attribute: &Attribute, leaving: f64, arriving: f64, seconds: f64) -> Segment {
+    if is_constant(attribute) {
+        return if attribute.has(CONSTANT_NEXT) {
+            Segment::HoldNext
+        } else {
+            Segment::Hold
+        };
+    }
+    if !attribute.has(CUBIC) {
+        return Segment::Line;
+    }
+    let handle = |weight: f64, slope: f64| Handle {
+        weight,
+        rise: slope * weight * seconds,
+    };
+    Segment::Cubic {
+        leave: handle(attribute.right_weight(), leaving),
+        arrive: handle(attribute.next_left_weight(), arriving),
+    }
+}
+
+fn beyond(record: &Element) -> Beyond {
+    // The type is one letter, written as a character code.
+    let kind = record
+        .child("Type")
+        .and_then(|kind| kind.int(0))
+        .and_then(|code| u8::try_from(code).ok());
+    let repeats = record.child("Repetition").and_then(|count| count.int(0));
+    let repeats = repeats
+        .filter(|&count| count >= 0)
+        .map(|count| count as f64);
+    let cycle = |mirror, climb| Beyond::Cycle {
+        repeats,
+        mirror,
+        climb,
+    };
+    match kind {
+        Some(b'K') => Beyond::Slope,
+        Some(b'R') => cycle(false, false),
+        Some(b'M') => cycle(true, false),
+        Some(b'A') => cycle(false, true),
+        _ => Beyond::Hold,
+    }
+}

@@ -1,0 +1,309 @@
+//! Layers of a take: which curves drive which properties, and how layers blend.
+
+use super::FbxError;
+use super::curve::Curve;
+use super::nodes::{Rig, Tree};
+use super::objects::{Graph, Object};
+use super::properties::{Properties, Templates};
+use super::transform::{Order, Pose, Property, from_euler, slerp, to_euler};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// All curves that are connected to something, each read once.
+pub(super) struct Curves {
+    pub list: Vec<Curve>,
+    of_object: BTreeMap<usize, Option<usize>>,
+    /// Ticks per second.
+    ticks: f64,
+    budget: usize,
+}
+
+impl Curves {
+    pub fn new(ticks: f64, budget: usize) -> Self {
+        Self {
+            list: Vec::new(),
+            of_object: BTreeMap::new(),
+            ticks,
+            budget,
+        }
+    }
+
+    fn load(&mut self, object: &Object, index: usize) -> Result<Option<usize>, FbxError> {
+        if let Some(&known) = self.of_object.get(&index) {
+            return Ok(known);
+        }
+        let curve = Curve::read(object.record, self.ticks, &mut self.budget).map_err(|reason| {
+            let id = object.record.int(0).unwrap_or(0);
+            FbxError::Broken {
+                place: format!("animation curve {id}"),
+                reason: reason.into(),
+            }
+        })?;
+        let place = curve.map(|curve| {
+            self.list.push(curve);
+            self.list.len() - 1
+        });
+        self.of_object.insert(index, place);
+        Ok(place)
+    }
+}
+
+/// How a layer joins what lies under it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Blend {
+    Additive,
+    Override,
+    /// Override by the layer's weight.
+    Passthrough,
+}
+
+#[derive(Debug)]
+struct Layer {
+    blend: Blend,
+    /// Rotations join as rotations, not angle by angle.
+    compose_rotation: bool,
+    /// Scales join by multiplication.
+    compose_scale: bool,
+    /// 0 to 1.
+    weight: f64,
+    weight_curve: Option<usize>,
+}
+
+/// A property that one layer drives; an axis without a curve keeps its `constant`.
+#[derive(Debug)]
+pub(super) struct Channel {
+    layer: usize,
+    property: Property,
+    constant: Vector3<f64>,
+    pub curves: [Option<usize>; 3],
+}
+
+impl Channel {
+    fn value(&self, curves: &[Curve], tick: f64) -> Vector3<f64> {
+        Vector3::from_fn(|axis, _| {
+            let curve = self.curves[axis].and_then(|curve| curves.get(curve));
+            curve.map_or(self.constant[axis], |curve| curve.value(tick))
+        })
+    }
+}
+
+/// One take's layers and channels.
+#[derive(Debug)]
+pub(super) struct Animation {
+    layers: Vec<Layer>,
+    /// Channels of every node, lower layers first.
+    channels: Vec<Vec<Channel>>,
+}
+
+impl Animation {
+    /// Reads the layers of the `AnimationStack` at `stack`.
+    pub fn read(
+        graph: &Graph,
+        stack: usize,
+        templates: &Templates,
+        tree: &Tree,
+        curves: &mut Curves,
+    ) -> Result<Self, FbxError> {
+        let mut animation = Self {
+            layers: Vec::new(),
+            channels: Vec::new(),
+        };
+        animation.channels.resize_with(tree.nodes.len(), Vec::new);
+        for link in graph.children(stack, "AnimationLayer") {
+            let record = graph.objects[link.child].record;
+            animation.layers.push(layer(&templates.properties(record)));
+            animation.read_channels(graph, link.child, templates, tree, curves)?;
+        }
+        Ok(animation)
+    }
+
+    fn read_channels(
+        &mut self,
+        graph: &Graph,
+        layer: usize,
+        templates: &Templates,
+        tree: &Tree,
+        curves: &mut Curves,
+    ) -> Result<(), FbxError> {
+        for link in graph.children(layer, "AnimationCurveNode") {
+            let curve_node = link.child;
+            let properties = templates.properties(graph.objects[curve_node].record);
+            for target in graph.parents(curve_node, "Model") {
+                let property = target.property.and_then(Property::named);
+                let (Some(property), Some(node)) = (property, tree.of_object[target.parent]) else {
+                    continue;
+                };
+                let axes = axes(graph, curve_node, curves)?;
+                self.add(
+                    node,
+                    property,
+                    constants(&properties),
+                    axes,
+                    &tree.rigs[node],
+                );
+            }
+            if graph
+                .parents(curve_node, "AnimationLayer")
+                .any(|l| l.parent == layer && l.property == Some(b"Weight"))
+            {
+                let [curve, ..] = axes(graph, curve_node, curves)?;
+                if let Some(layer) = self.layers.last_mut() {
+                    layer.weight_curve = curve;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a channel to the last layer, unless that layer already drives the property.
+    fn add(
+        &mut self,
+        node: usize,
+        property: Property,
+        constants: [Option<f64>; 3],
+        curves: [Option<usize>; 3],
+        rig: &Rig,
+    ) {
+        let layer = self.layers.len().saturating_sub(1);
+        let channels = &mut self.channels[node];
+        let mut own = channels
+            .iter()
+            .rev()
+            .take_while(|channel| channel.layer == layer);
+        if own.any(|channel| channel.property == property) {
+            return;
+        }
+        let adds = layer > 0 && self.layers[layer].blend == Blend::Additive;
+        let otherwise = if adds { Pose::identity() } else { rig.rest };
+        let constant =
+            Vector3::from_fn(|axis, _| constants[axis].unwrap_or(otherwise.at(property)[axis]));
+        channels.push(Channel {
+            layer,
+            property,
+            constant,
+            curves,
+        });
+    }
+
+    pub fn channels(&self, node: usize) -> &[Channel] {
+        &self.channels[node]
+    }
+
+    /// Weights of all layers at `tick`.
+    pub fn weights(&self, curves: &[Curve], tick: f64) -> Vec<f64> {
+        let weight = |layer: &Layer| match layer.weight_curve.and_then(|curve| curves.get(curve)) {
+            Some(curve) => unit_weight(curve.value(tick)),
+            None => layer.weight,
+        };
+        self.layers.iter().map(weight).collect()
+    }
+
+    /// The properties of `node` at `tick`. The first layer replaces the rest pose, whatever its mode.
+    pub fn pose(
+        &self,
+        node: usize,
+        rig: &Rig,
+        curves: &[Curve],
+        weights: &[f64],
+        tick: f64,
+    ) -> Pose {
+        let mut pose = rig.rest;
+        for channel in &self.channels[node] {
+            let over = channel.value(curves, tick);
+            let slot = pose.at_mut(channel.property);
+            *slot = match self.layers.get(channel.layer) {
+                Some(layer) if channel.layer > 0 => layer.join(
+                    channel.property,
+                    *slot,
+                    over,
+                    weights[channel.layer],
+                    rig.rules.order,
+                ),
+                _ => over,
+            };
+        }
+        pose
+    }
+}
+
+impl Layer {
+    fn join(
+        &self,
+        property: Property,
+        under: Vector3<f64>,
+        over: Vector3<f64>,
+        weight: f64,
+        order: Order,
+    ) -> Vector3<f64> {
+        let rotates = self.compose_rotation && property == Property::Rotation;
+        let scales = self.compose_scale && property == Property::Scaling;
+        let turned = |v| from_euler(v, order);
+        match self.blend {
+            Blend::Override => over,
+            Blend::Additive if scales => under.component_mul(&power(over, weight)),
+            Blend::Additive if rotates => to_euler(
+                &(turned(under) * slerp(&Matrix3::identity(), &turned(over), weight)),
+                order,
+            ),
+            Blend::Additive => under + over * weight,
+            Blend::Passthrough if scales => {
+                power(under, 1.0 - weight).component_mul(&power(over, weight))
+            }
+            Blend::Passthrough if rotates => {
+                to_euler(&slerp(&turned(under), &turned(over), weight), order)
+            }
+            Blend::Passthrough => under * (1.0 - weight) + over * weight,
+        }
+    }
+}
+
+/// Scale to a power between 0 and 1; mirroring stays.
+fn power(scale: Vector3<f64>, exponent: f64) -> Vector3<f64> {
+    if exponent <= 0.0 {
+        return Vector3::repeat(1.0);
+    }
+    scale.map(|value| value.abs().powf(exponent).copysign(value))
+}
+
+fn unit_weight(percent: f64) -> f64 {
+    (percent / 100.0).clamp(0.0, 1.0)
+}
+
+fn layer(properties: &Properties) -> Layer {
+    let composes = |name| properties.int(name).unwrap_or(0) == 0;
+    Layer {
+        blend: match properties.int("BlendMode").unwrap_or(0) {
+            0 => Blend::Additive,
+            2 => Blend::Passthrough,
+            _ => Blend::Override,
+        },
+        compose_rotation: composes("RotationAccumulationMode"),
+        compose_scale: composes("ScaleAccumulationMode"),
+        weight: unit_weight(properties.real("Weight").unwrap_or(100.0)),
+        weight_curve: None,
+    }
+}
+
+/// Values of the axes that have no curve.
+fn constants(properties: &Properties) -> [Option<f64>; 3] {
+    ["d|X", "d|Y", "d|Z"].map(|name| properties.real(name))
+}
+
+/// Curves of the three axes of an `AnimationCurveNode`.
+fn axes(
+    graph: &Graph,
+    curve_node: usize,
+    curves: &mut Curves,
+) -> Result<[Option<usize>; 3], FbxError> {
+    let mut axes = [None; 3];
+    for link in graph.children(curve_node, "AnimationCurve") {
+        let axis = match link.property {
+            Some(b"d|Y") => 1,
+            Some(b"d|Z") => 2,
+            Some(_) => 0,
+            None => continue,
+        };
+        axes[axis] = curves.load(&graph.objects[link.child], link.child)?;
+    }
+    Ok(axes)
+}

@@ -1,0 +1,191 @@
+//! FBX, binary, versions 7.0 to 7.9.
+
+mod curve;
+mod document;
+mod inflate;
+mod layers;
+mod nodes;
+mod objects;
+mod properties;
+mod settings;
+mod takes;
+mod tangent;
+mod transform;
+
+#[cfg(test)]
+mod against_ufbx;
+
+use crate::clip::{Problem, Severity};
+use crate::import::scene::{Node, Scene, Take};
+use curve::Curve;
+use document::Document;
+use layers::{Animation, Curves};
+use nalgebra::{Matrix3, Matrix4};
+use nodes::{Rig, Tree};
+use objects::Graph;
+use properties::Templates;
+use settings::Settings;
+use transform::World;
+
+/// Why a file can't be read as FBX.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum FbxError {
+    #[error("not an FBX file")]
+    NotFbx,
+    #[error("ASCII FBX isn't supported; save as binary FBX 7.4 or newer")]
+    Ascii,
+    #[error("big-endian FBX isn't supported; save as binary FBX 7.4 or newer")]
+    BigEndian,
+    #[error("FBX version {found} isn't supported; save as binary FBX 7.4 or 7.5")]
+    Version { found: u32 },
+    #[error("broken FBX at {place}: {reason}; export or download it again")]
+    Broken { place: String, reason: String },
+}
+
+/// Whether a number of the file is finite and small enough for arithmetic with it to stay so.
+fn in_range(value: f64) -> bool {
+    value.abs() < 1e12
+}
+
+/// A parsed FBX file.
+pub(crate) struct FbxScene {
+    nodes: Vec<Node>,
+    rigs: Vec<Rig>,
+    takes: Vec<Take>,
+    /// One per take.
+    animations: Vec<Animation>,
+    curves: Vec<Curve>,
+    settings: Settings,
+    problems: Vec<Problem>,
+}
+
+/// Parses a binary FBX file.
+pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
+    let document = Document::parse(bytes)?;
+    let settings = Settings::read(&document);
+    let templates = Templates::read(&document);
+    let graph = Graph::read(&document);
+    let tree = Tree::read(&graph, &templates);
+    let mut curves = Curves::new(settings.ticks, document.budget);
+    let mut problems = settings.problems.clone();
+    problems.extend(graph_problems(&graph, &tree));
+    let (mut takes, mut animations) = (Vec::new(), Vec::new());
+    for stack in graph.of_class("AnimationStack") {
+        let animation = Animation::read(&graph, stack, &templates, &tree, &mut curves)?;
+        let object = &graph.objects[stack];
+        let (count, ticks) = (tree.nodes.len(), settings.ticks);
+        let properties = templates.properties(object.record);
+        let take = takes::take(
+            &object.name,
+            &properties,
+            &animation,
+            count,
+            &curves.list,
+            ticks,
+            settings.fps,
+        );
+        problems.extend(takes::problems(
+            &take,
+            &animation,
+            count,
+            &curves.list,
+            ticks,
+        ));
+        takes.push(take);
+        animations.push(animation);
+    }
+    let curves = curves.list;
+    if curves.iter().any(|curve| curve.mended) {
+        problems.push(warning(
+            "mended-curves",
+            "some curves had keys out of order or without a finite value",
+        ));
+    }
+    let Tree { nodes, rigs, .. } = tree;
+    Ok(FbxScene {
+        nodes,
+        rigs,
+        takes,
+        animations,
+        curves,
+        settings,
+        problems,
+    })
+}
+
+fn warning(id: &str, message: &str) -> Problem {
+    Problem {
+        id: id.into(),
+        severity: Severity::Warning,
+        message: message.into(),
+    }
+}
+
+fn graph_problems(graph: &Graph, tree: &Tree) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    if tree.circular {
+        problems.push(warning(
+            "circular-nodes",
+            "some nodes are their own ancestors; the circle was cut",
+        ));
+    }
+    if graph.of_class("Constraint").next().is_some() {
+        let message = "constraints aren't evaluated; bake the animation before exporting if the motion looks wrong";
+        problems.push(warning("constraints-left-out", message));
+    }
+    problems
+}
+
+impl Scene for FbxScene {
+    fn format(&self) -> &'static str {
+        "fbx"
+    }
+
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    fn takes(&self) -> &[Take] {
+        &self.takes
+    }
+
+    fn up_axis(&self) -> &str {
+        &self.settings.up_axis
+    }
+
+    fn unit_m(&self) -> f64 {
+        self.settings.unit_m
+    }
+
+    fn canonical_from_file(&self) -> Matrix3<f64> {
+        self.settings.canonical_from_file
+    }
+
+    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
+    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let moment = at.and_then(|(take, time)| {
+            let animation = self.animations.get(take)?;
+            let tick = (time * self.settings.ticks).round();
+            Some((animation, tick, animation.weights(&self.curves, tick)))
+        });
+        let mut worlds: Vec<World> = Vec::with_capacity(self.nodes.len());
+        for (index, (node, rig)) in self.nodes.iter().zip(&self.rigs).enumerate() {
+            let pose = match &moment {
+                Some((animation, tick, weights)) => {
+                    animation.pose(index, rig, &self.curves, weights, *tick)
+                }
+                None => rig.rest,
+            };
+            let parent = node
+                .parent
+                .and_then(|parent| worlds.get(parent).copied())
+                .unwrap_or_else(World::root);
+            worlds.push(parent.child(&pose, &rig.rules));
+        }
+        worlds.iter().map(World::matrix).collect()
+    }
+
+    fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+}

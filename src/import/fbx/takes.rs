@@ -1,0 +1,141 @@
+//! Takes: their time span, frame rate, and what they move.
+
+use super::curve::Curve;
+use super::layers::Animation;
+use super::properties::Properties;
+use crate::clip::{Problem, Severity};
+use crate::import::scene::Take;
+use std::collections::BTreeMap;
+
+/// Spans beyond this are unset markers, not takes.
+const MAX_SECONDS: f64 = 6.0 * 3600.0;
+const FALLBACK_FPS: f64 = 30.0;
+
+/// Makes the take `name` of an animation. `fps` is what the file states; `ticks` is ticks per second.
+pub(super) fn take(
+    name: &str,
+    properties: &Properties,
+    animation: &Animation,
+    nodes: usize,
+    curves: &[Curve],
+    ticks: f64,
+    fps: Option<f64>,
+) -> Take {
+    let keyed = key_range(animation, nodes, curves);
+    let (start, end) = span(properties, keyed, ticks);
+    let moves = |node: &usize| {
+        let mut own = curves_of(animation, *node, curves);
+        own.any(|curve| curve.varies((start * ticks).round(), (end * ticks).round()))
+    };
+    let animated = (0..nodes).filter(moves).collect();
+    let fps =
+        fps.unwrap_or_else(|| spacing_fps(animation, nodes, curves, ticks).unwrap_or(FALLBACK_FPS));
+    Take {
+        name: name.into(),
+        start,
+        end,
+        fps,
+        animated,
+        wraps: None,
+    }
+}
+
+fn curves_of<'a>(
+    animation: &'a Animation,
+    node: usize,
+    curves: &'a [Curve],
+) -> impl Iterator<Item = &'a Curve> {
+    let used = animation
+        .channels(node)
+        .iter()
+        .flat_map(|channel| channel.curves)
+        .flatten();
+    used.filter_map(|curve| curves.get(curve))
+}
+
+fn all_curves<'a>(
+    animation: &'a Animation,
+    nodes: usize,
+    curves: &'a [Curve],
+) -> impl Iterator<Item = &'a Curve> {
+    (0..nodes).flat_map(move |node| curves_of(animation, node, curves))
+}
+
+/// First and last tick of the curves that move nodes.
+fn key_range(animation: &Animation, nodes: usize, curves: &[Curve]) -> Option<(f64, f64)> {
+    let ends = all_curves(animation, nodes, curves).map(Curve::ends);
+    ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Start and end in seconds: the take's own span, else its reference span, else that of its keys.
+fn span(properties: &Properties, keyed: Option<(f64, f64)>, ticks: f64) -> (f64, f64) {
+    let stated = |start, stop| {
+        let start = properties.int(start).unwrap_or(0) as f64 / ticks;
+        let stop = properties.int(stop)? as f64 / ticks;
+        (stop > start).then_some((start, stop))
+    };
+    let spans = [
+        stated("LocalStart", "LocalStop"),
+        stated("ReferenceStart", "ReferenceStop"),
+        keyed.map(|(first, last)| (first / ticks, last / ticks)),
+    ];
+    let sane =
+        |&(start, end): &(f64, f64)| end - start <= MAX_SECONDS && start.abs() <= 1e3 * MAX_SECONDS;
+    spans.into_iter().flatten().find(sane).unwrap_or((0.0, 0.0))
+}
+
+/// Frame rate of the keys' most common spacing; of equally common ones, the fastest.
+fn spacing_fps(animation: &Animation, nodes: usize, curves: &[Curve], ticks: f64) -> Option<f64> {
+    let mut counts = BTreeMap::<u64, usize>::new();
+    for curve in all_curves(animation, nodes, curves) {
+        for spacing in curve.spacings().filter(|&spacing| spacing >= 1.0) {
+            *counts.entry(spacing as u64).or_default() += 1;
+        }
+    }
+    let (spacing, _) = counts
+        .into_iter()
+        .max_by_key(|&(spacing, count)| (count, std::cmp::Reverse(spacing)))?;
+    let fps = ticks / spacing as f64;
+    // Exporters round key times to ticks or milliseconds.
+    let whole = fps.round();
+    let fps = if (fps - whole).abs() < 1e-3 * whole {
+        whole
+    } else {
+        fps
+    };
+    (1.0..=1000.0).contains(&fps).then_some(fps)
+}
+
+/// What a take's owner should know about it.
+pub(super) fn problems(
+    take: &Take,
+    animation: &Animation,
+    nodes: usize,
+    curves: &[Curve],
+    ticks: f64,
+) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    let mut note = |id: &str, message| {
+        problems.push(Problem {
+            id: id.into(),
+            severity: Severity::Note,
+            message,
+        });
+    };
+    if take.animated.is_empty() {
+        note("empty-take", format!("take `{}` moves nothing", take.name));
+    }
+    if let Some((first, last)) = key_range(animation, nodes, curves) {
+        let (first, last, frame) = (first / ticks, last / ticks, 1.0 / take.fps);
+        if first < take.start - frame || last > take.end + frame {
+            note(
+                "keys-outside-take",
+                format!(
+                    "take `{}` spans {:.3} to {:.3} s and its keys {first:.3} to {last:.3} s; only its span is used",
+                    take.name, take.start, take.end
+                ),
+            );
+        }
+    }
+    problems
+}

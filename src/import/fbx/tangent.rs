@@ -1,0 +1,194 @@
+//! Slopes of cubic keys: automatic, TCB, and set by the user.
+
+const TANGENT_TCB: u32 = 0x200;
+const TANGENT_USER: u32 = 0x400;
+const CLAMP: u32 = 0x1000;
+const TIME_INDEPENDENT: u32 = 0x2000;
+const CLAMP_PROGRESSIVE: u32 = 0x4000;
+const WEIGHTED_RIGHT: u32 = 0x0100_0000;
+const WEIGHTED_NEXT_LEFT: u32 = 0x0200_0000;
+
+/// Weight of a tangent that isn't weighted: the Bezier handle stands at a third of the segment.
+pub(super) const THIRD: f64 = 1.0 / 3.0;
+
+/// What the file says about one key: flags and four 32-bit values whose meaning depends on them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Attribute {
+    pub flags: u32,
+    pub data: [u32; 4],
+}
+
+impl Attribute {
+    pub fn has(&self, flag: u32) -> bool {
+        self.flags & flag != 0
+    }
+
+    fn real(&self, index: usize) -> f64 {
+        let value = f64::from(f32::from_bits(self.data[index & 3]));
+        if super::in_range(value) { value } else { 0.0 }
+    }
+
+    /// Weights are two 16-bit counts of 1/10000 in the third value.
+    pub fn right_weight(&self) -> f64 {
+        let weight = f64::from(self.data[2] & 0xffff) * 1e-4;
+        if self.has(WEIGHTED_RIGHT) {
+            weight
+        } else {
+            THIRD
+        }
+    }
+
+    pub fn next_left_weight(&self) -> f64 {
+        let weight = f64::from(self.data[2] >> 16) * 1e-4;
+        if self.has(WEIGHTED_NEXT_LEFT) && !self.has(TANGENT_TCB) {
+            weight
+        } else {
+            THIRD
+        }
+    }
+
+    /// Slope of the next key's left side, in units per second, or its bias if that key is automatic.
+    fn next_left(&self) -> f64 {
+        if self.has(TANGENT_TCB) {
+            0.0
+        } else {
+            self.real(1)
+        }
+    }
+}
+
+/// The step to a neighbouring key.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    /// Seconds, above 0.
+    pub time: f64,
+    pub rise: f64,
+    /// Weight of the key's tangent on this side.
+    pub weight: f64,
+}
+
+impl Step {
+    fn slope(&self) -> f64 {
+        self.rise / self.time
+    }
+}
+
+/// Slopes on the left and on the right of a cubic key, in units per second.
+pub(super) fn slopes(
+    before: Option<Step>,
+    after: Option<Step>,
+    previous: Option<Attribute>,
+    own: Attribute,
+) -> (f64, f64) {
+    let left = previous.map_or(0.0, |attribute| attribute.next_left());
+    let right = own.real(0);
+    if own.has(TANGENT_TCB) {
+        return kochanek_bartels(before, after, own);
+    }
+    if own.has(TANGENT_USER) {
+        return (left, right);
+    }
+    match (before, after) {
+        (Some(before), Some(after)) => (
+            automatic(before, after, -left, own),
+            automatic(before, after, right, own),
+        ),
+        (Some(before), None) => pair(at_end(before, -left, own)),
+        (None, Some(after)) => pair(at_end(after, right, own)),
+        (None, None) => (0.0, 0.0),
+    }
+}
+
+fn pair(slope: f64) -> (f64, f64) {
+    (slope, slope)
+}
+
+/// Kochanek and Bartels 1984; a missing neighbour's share goes to the other one.
+fn kochanek_bartels(before: Option<Step>, after: Option<Step>, own: Attribute) -> (f64, f64) {
+    let [tension, continuity, bias] = [0, 1, 2].map(|i| own.real(i));
+    let share = if before.is_some() && after.is_some() {
+        0.5
+    } else {
+        1.0
+    };
+    let from_before =
+        before.map_or(0.0, |step| step.slope()) * share * (1.0 - tension) * (1.0 + bias);
+    let from_after =
+        after.map_or(0.0, |step| step.slope()) * share * (1.0 - tension) * (1.0 - bias);
+    (
+        from_before * (1.0 - continuity) + from_after * (1.0 + continuity),
+        from_before * (1.0 + continuity) + from_after * (1.0 - continuity),
+    )
+}
+
+/// Automatic slope of a key between two others. `bias` is in percent, towards the segment after where positive.
+fn automatic(before: Step, after: Step, bias: f64, own: Attribute) -> f64 {
+    if own.has(CLAMP) && (before.rise == 0.0 || after.rise == 0.0) {
+        return 0.0;
+    }
+    let span = before.time + after.time;
+    let chord = (before.rise + after.rise) / span;
+    let slope = if own.has(TIME_INDEPENDENT) {
+        chord
+    } else {
+        let share = before.time / span;
+        let parabolic = before.slope() * (1.0 - share) + after.slope() * share;
+        biased(0.5 * (chord + parabolic), before, after, bias)
+    };
+    if own.has(CLAMP_PROGRESSIVE) {
+        clamped(slope, before, after)
+    } else {
+        slope
+    }
+}
+
+fn biased(slope: f64, before: Step, after: Step, bias: f64) -> f64 {
+    let weight = bias.abs() / 100.0;
+    if weight <= 1e-4 {
+        return slope;
+    }
+    let target = if bias > 0.0 {
+        after.slope()
+    } else {
+        before.slope()
+    };
+    let towards = if (target - slope).abs() > 1e-5 {
+        target - slope
+    } else {
+        bias
+    };
+    slope + (target - slope) * weight + steepening(bias).copysign(towards)
+}
+
+/// Bias beyond 500 percent steepens by an absolute amount. Not below 0.
+fn steepening(bias: f64) -> f64 {
+    let beyond = (bias.abs() / 100.0 - 5.0).max(0.0);
+    40.0 * beyond * beyond
+}
+
+/// Keeps both Bezier handles between the values of the key and of its neighbours.
+fn clamped(slope: f64, before: Step, after: Step) -> f64 {
+    let sign = 1f64.copysign(slope);
+    let limit = |step: Step| {
+        let reach = step.weight * step.time;
+        if reach > 0.0 {
+            (sign * step.rise / reach).max(0.0)
+        } else {
+            0.0
+        }
+    };
+    sign * slope.abs().min(limit(before)).min(limit(after))
+}
+
+/// Automatic slope of the first or last key.
+fn at_end(step: Step, bias: f64, own: Attribute) -> f64 {
+    if own.has(CLAMP_PROGRESSIVE) || own.has(CLAMP) && step.rise == 0.0 {
+        return 0.0;
+    }
+    let extra = if own.has(TIME_INDEPENDENT) {
+        0.0
+    } else {
+        steepening(bias).copysign(bias)
+    };
+    step.slope() + extra
+}

@@ -1,0 +1,218 @@
+//! From a node's transform properties to its place in the world, as FBX composes them.
+
+use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
+
+/// A transform property that a curve may drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Property {
+    Translation,
+    Rotation,
+    Scaling,
+    PreRotation,
+    PostRotation,
+    RotationOffset,
+    RotationPivot,
+    ScalingOffset,
+    ScalingPivot,
+}
+
+impl Property {
+    pub const ALL: [(&'static str, Self); 9] = [
+        ("Lcl Translation", Self::Translation),
+        ("Lcl Rotation", Self::Rotation),
+        ("Lcl Scaling", Self::Scaling),
+        ("PreRotation", Self::PreRotation),
+        ("PostRotation", Self::PostRotation),
+        ("RotationOffset", Self::RotationOffset),
+        ("RotationPivot", Self::RotationPivot),
+        ("ScalingOffset", Self::ScalingOffset),
+        ("ScalingPivot", Self::ScalingPivot),
+    ];
+
+    pub fn named(name: &[u8]) -> Option<Self> {
+        Self::ALL
+            .iter()
+            .find(|(known, _)| known.as_bytes() == name)
+            .map(|&(_, property)| property)
+    }
+}
+
+/// Values of all transform properties; rotations are Euler angles in degrees.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pose([Vector3<f64>; 9]);
+
+impl Pose {
+    pub fn identity() -> Self {
+        let mut pose = Self([Vector3::zeros(); 9]);
+        *pose.at_mut(Property::Scaling) = Vector3::repeat(1.0);
+        pose
+    }
+
+    pub fn at(&self, property: Property) -> Vector3<f64> {
+        self.0[property as usize]
+    }
+
+    pub fn at_mut(&mut self, property: Property) -> &mut Vector3<f64> {
+        &mut self.0[property as usize]
+    }
+}
+
+/// The three axes in the order in which Euler angles turn about them.
+pub(super) type Order = [usize; 3];
+pub(super) const XYZ: Order = [0, 1, 2];
+
+/// Order of the file's `RotationOrder`. The spheric order differs from XYZ only in how software interpolates.
+pub(super) fn rotation_order(code: i64) -> Order {
+    match code {
+        1 => [0, 2, 1],
+        2 => [1, 2, 0],
+        3 => [1, 0, 2],
+        4 => [2, 0, 1],
+        5 => [2, 1, 0],
+        _ => XYZ,
+    }
+}
+
+/// What of its parent's scale a node inherits, by FBX's names: R and S the parent's, r and s its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Inherit {
+    /// The parent's scale works along the node's own axes, without shear.
+    RrSs,
+    /// Ordinary matrix product.
+    RSrs,
+    /// The parent's own scale is left out.
+    Rrs,
+}
+
+/// How a node's properties become its transform.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rules {
+    pub order: Order,
+    /// Pre- and post-rotation and the rotation order count.
+    pub rotation_space: bool,
+    pub inherit: Inherit,
+}
+
+/// Rotation of Euler angles in degrees.
+pub(super) fn from_euler(degrees: Vector3<f64>, order: Order) -> Matrix3<f64> {
+    order.iter().fold(Matrix3::identity(), |m, &axis| {
+        about(axis, degrees[axis]) * m
+    })
+}
+
+fn about(axis: usize, degrees: f64) -> Matrix3<f64> {
+    let mut m = Matrix3::identity();
+    if degrees != 0.0 {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        m[(j, j)] = cos;
+        m[(k, k)] = cos;
+        m[(j, k)] = -sin;
+        m[(k, j)] = sin;
+    }
+    m
+}
+
+/// Euler angles in degrees of a rotation; the middle one within ±90°.
+pub(super) fn to_euler(m: &Matrix3<f64>, order: Order) -> Vector3<f64> {
+    let [i, j, k] = order;
+    let parity = if (i + 1) % 3 == j { 1.0 } else { -1.0 };
+    let sin = (-parity * m[(k, i)]).clamp(-1.0, 1.0);
+    let mut angles = Vector3::zeros();
+    angles[j] = sin.asin();
+    if sin.abs() < 0.999_999_999 {
+        angles[i] = (parity * m[(k, j)]).atan2(m[(k, k)]);
+        angles[k] = (parity * m[(j, i)]).atan2(m[(i, i)]);
+    } else {
+        angles[k] = (-parity * m[(i, j)]).atan2(m[(j, j)]);
+    }
+    angles.map(f64::to_degrees)
+}
+
+/// The rotation from `a` to `b`, `weight` of the shorter way.
+pub(super) fn slerp(a: &Matrix3<f64>, b: &Matrix3<f64>, weight: f64) -> Matrix3<f64> {
+    let step = Rotation3::from_matrix_unchecked(a.transpose() * b);
+    a * Rotation3::new(step.scaled_axis() * weight).matrix()
+}
+
+/// A node in its parent: translate, rotate, scale.
+struct Local {
+    translation: Vector3<f64>,
+    rotation: Matrix3<f64>,
+    scale: Vector3<f64>,
+}
+
+/// `T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹`, the chain of FBX's documentation.
+fn local(pose: &Pose, rules: &Rules) -> Local {
+    use Property::*;
+    let rotation = if rules.rotation_space {
+        let own = from_euler(pose.at(Rotation), rules.order);
+        from_euler(pose.at(PreRotation), XYZ)
+            * own
+            * from_euler(pose.at(PostRotation), XYZ).transpose()
+    } else {
+        from_euler(pose.at(Rotation), XYZ)
+    };
+    let scale = pose.at(Scaling);
+    let (pivot, centre) = (pose.at(RotationPivot), pose.at(ScalingPivot));
+    let turned = pose.at(ScalingOffset) + centre - scale.component_mul(&centre) - pivot;
+    let translation = pose.at(Translation) + pose.at(RotationOffset) + pivot + rotation * turned;
+    Local {
+        translation,
+        rotation,
+        scale,
+    }
+}
+
+/// A node in the world: the linear part is `frame` times the diagonal of `scale`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct World {
+    frame: Matrix3<f64>,
+    scale: Vector3<f64>,
+    /// The part of `scale` that comes from the ancestors.
+    received: Vector3<f64>,
+    translation: Vector3<f64>,
+}
+
+impl World {
+    pub fn root() -> Self {
+        let one = Vector3::repeat(1.0);
+        Self {
+            frame: Matrix3::identity(),
+            scale: one,
+            received: one,
+            translation: Vector3::zeros(),
+        }
+    }
+
+    pub fn child(&self, pose: &Pose, rules: &Rules) -> Self {
+        let local = local(pose, rules);
+        let (frame, received) = match rules.inherit {
+            Inherit::RSrs => (self.linear(), Vector3::repeat(1.0)),
+            Inherit::RrSs => (self.frame, self.scale),
+            Inherit::Rrs => (self.frame, self.received),
+        };
+        Self {
+            frame: frame * local.rotation,
+            scale: local.scale.component_mul(&received),
+            received,
+            translation: self.translation + self.linear() * local.translation,
+        }
+    }
+
+    fn linear(&self) -> Matrix3<f64> {
+        let mut linear = self.frame;
+        for (mut column, scale) in linear.column_iter_mut().zip(&self.scale) {
+            column *= *scale;
+        }
+        linear
+    }
+
+    pub fn matrix(&self) -> Matrix4<f64> {
+        let mut matrix = self.linear().to_homogeneous();
+        matrix
+            .fixed_view_mut::<3, 1>(0, 3)
+            .copy_from(&self.translation);
+        matrix
+    }
+}
