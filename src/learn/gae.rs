@@ -135,7 +135,7 @@ mod tests {
             final_values: &[0.0; 4],
             next_values: &[2.0],
         };
-        let (mut a, mut r) = ([0.0; 4], [0.0; 4]);
+        let (mut a, mut r) = ([0.0_f64; 4], [0.0; 4]);
         advantages(&rollout, 0.9, 1.0, &mut a, &mut r).unwrap();
         let sum = rewards
             .iter()

@@ -5,7 +5,10 @@
 //! bits at any number of threads: work is cut into a fixed number of pieces and sums are added in a fixed order.
 
 mod adam;
-//X mod checkpoint;
+mod batch;
+mod checkpoint;
+mod config;
+mod file;
 mod gae;
 mod kernels;
 mod network;
@@ -14,19 +17,26 @@ mod policy;
 mod ppo;
 mod random;
 mod rollout;
+mod stats;
 mod surrogate;
 mod trainer;
+#[cfg(test)]
+mod tests;
 mod value_scale;
 
 pub use adam::{Adam, AdamConfig};
-//X pub use checkpoint::{Checkpoint, CheckpointError};
+pub use batch::{Batch, shuffled};
+pub use checkpoint::{Checkpoint, PolicyFile};
+pub use config::Config;
+pub use file::FileError;
 pub use gae::{StepEnd, Trajectories, advantages};
 pub use kernels::Scalar;
 pub use network::{Activation, Mlp, Workspace};
 pub use normalizer::{FrozenNormalizer, Normalizer};
 pub use policy::{ActWorkspace, Acted, NamedTensor, Policy, PolicySpec, fill_normal};
-pub use ppo::{Batch, Config, Learner, LearnerState, UpdateStats, shuffled};
+pub use ppo::{Learner, LearnerState};
 pub use random::RngState;
+pub use stats::UpdateStats;
 pub use surrogate::LossTerms;
 pub use trainer::{Metrics, Plan, TrainError, Trainer, TrainerState};
 pub use value_scale::ValueScale;
@@ -50,6 +60,8 @@ pub enum LearnError {
         "observation {column} is not finite; look for a simulation that blew up or a division by zero in the observation"
     )]
     Observation { column: usize },
+    #[error("{what} are not finite at sample {sample}; look for a simulation that blew up")]
+    NotFinite { what: &'static str, sample: usize },
     #[error(
         "the gradient is not finite in epoch {epoch}, minibatch {minibatch}; lower the learning rate or look for non-finite rewards and observations"
     )]

@@ -1,0 +1,80 @@
+//! What an update reports.
+
+use super::kernels::Scalar;
+use super::surrogate::LossTerms;
+use super::value_scale::mean_and_std;
+use serde::{Deserialize, Serialize};
+
+/// How an update went. Losses are means over the minibatches used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct UpdateStats {
+    pub policy_loss: f64,
+    /// Mean squared error on the critic's own scale.
+    pub value_loss: f64,
+    pub action_bound_loss: f64,
+    /// Mean over the last epoch; of the last minibatch if that stopped the update.
+    pub approx_kl: f64,
+    pub clip_fraction: f64,
+    /// `1 − Var(return − value)/Var(return)` of the critic before the update.
+    pub explained_variance: f64,
+    /// Of the policy after the update, nats.
+    pub entropy: f64,
+    /// Mean Euclidean norm of the gradient before clipping.
+    pub gradient_norm: f64,
+    /// That this update used.
+    pub learning_rate: f64,
+    /// Gradient steps taken.
+    pub steps: usize,
+    /// Whether the KL divergence ended the update early.
+    pub stopped_early: bool,
+}
+
+/// Sums over the minibatches of one update.
+#[derive(Default)]
+pub(super) struct Run {
+    pub(super) terms: LossTerms,
+    pub(super) norms: f64,
+    pub(super) steps: usize,
+    pub(super) epoch_kl: f64,
+    pub(super) epoch_steps: usize,
+    pub(super) stopped: Option<f64>,
+}
+
+impl Run {
+    pub(super) fn begin_epoch(&mut self) {
+        self.epoch_kl = 0.0;
+        self.epoch_steps = 0;
+    }
+
+    pub(super) fn record(&mut self, terms: LossTerms, norm: f64) {
+        self.terms += terms;
+        self.norms += norm;
+        self.steps += 1;
+        self.epoch_kl += terms.approx_kl;
+        self.epoch_steps += 1;
+    }
+
+    pub(super) fn stop(&mut self, kl: f64) {
+        self.stopped = Some(kl);
+    }
+
+    pub(super) fn kl(&self) -> f64 {
+        self.stopped
+            .unwrap_or(self.epoch_kl / self.epoch_steps.max(1) as f64)
+    }
+}
+
+pub(super) fn explained_variance<T: Scalar>(values: &[T], returns: &[T]) -> f64 {
+    let errors: Vec<f64> = returns
+        .iter()
+        .zip(values)
+        .map(|(r, v)| r.to_f64() - v.to_f64())
+        .collect();
+    let (_, error) = mean_and_std(&errors);
+    let (_, all) = mean_and_std(returns);
+    if all > 0.0 {
+        1.0 - (error / all).powi(2)
+    } else {
+        0.0
+    }
+}
