@@ -182,7 +182,7 @@ impl<T: Scalar> Learner<T> {
             batch
                 .advantages
                 .iter()
-                .map(|a| standardise(a, mean, std + 1e-8)),
+                .map(|a| standardise(a, mean, std.max(1e-8))),
         );
         let mean = self.state.parameters[self.policy.value_mean_index()].to_f64();
         let std = self.state.parameters[self.policy.value_std_index()].to_f64();
