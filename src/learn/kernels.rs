@@ -319,3 +319,71 @@ vectorised! {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values of both signs, of a length that fills no vector width.
+    fn values(seed: u32) -> Vec<f32> {
+        (0..16 * 13 + 11)
+            .map(|i| ((i * 7919 + seed * 104_729) as f32).sin() * 3.0)
+            .collect()
+    }
+
+    #[test]
+    fn vectorised_loops_have_the_bits_of_scalar_arithmetic() {
+        let (mut p, mut m, mut v, g) = (values(1), values(2), values(3), values(4));
+        v.iter_mut().for_each(|v| *v = v.abs());
+        let step = AdamStep {
+            gradient_scale: 0.3,
+            beta1: 0.9,
+            beta2: 0.999,
+            one_minus_beta1: 0.1,
+            one_minus_beta2: 0.001,
+            step_size: 0.003,
+            epsilon: 1e-8,
+        };
+        let scalar = (0..p.len()).map(|i| {
+            let g = g[i] * 0.3;
+            let m = std::hint::black_box(0.9 * m[i]) + std::hint::black_box(0.1 * g);
+            let v = std::hint::black_box(0.999 * v[i]) + std::hint::black_box(0.001 * (g * g));
+            p[i] - std::hint::black_box(0.003 * m / (v.sqrt() + 1e-8))
+        });
+        let scalar: Vec<f32> = scalar.collect();
+        adam(&mut p, &mut m, &mut v, &g, step);
+        assert_eq!(p, scalar);
+
+        let mut lanes = [0.0_f32; 16];
+        for (i, x) in g.iter().enumerate() {
+            lanes[i % 16] += std::hint::black_box(x * x);
+        }
+        let sum: f64 = lanes.iter().map(|&lane| f64::from(lane)).sum();
+        assert_eq!(sum_of_squares(&g), sum);
+    }
+
+    #[test]
+    fn products_read_transposed_matrices() {
+        let (a, b) = (
+            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            [1.0, 0.0, -1.0, 2.0, 0.5, 1.0],
+        );
+        let (a, b) = (Matrix::new(&a, 2, 3), Matrix::new(&b, 2, 3));
+        let mut out = [10.0; 4];
+        multiply(&mut out, a, b.transposed(), false);
+        assert_eq!(out, [-2.0, 6.0, -2.0, 16.5]);
+        let mut out = [10.0; 9];
+        multiply(&mut out, a.transposed(), b, true);
+        assert_eq!(out, [19.0, 12.0, 13.0, 22.0, 12.5, 13.0, 25.0, 13.0, 13.0]);
+    }
+
+    #[test]
+    fn a_value_that_is_not_a_number_is_passed_on() {
+        let mut row = [f32::NAN, -1.0, 2.0];
+        bias_and_activate(&mut row, &[0.0; 3], Some(Activation::Relu));
+        assert!(row[0].is_nan() && row[1..] == [0.0, 2.0]);
+        let mut out = [0.0; 1];
+        standardise(&[f32::NAN], &[0.0], &[1.0], 10.0, &mut out);
+        assert!(out[0].is_nan());
+    }
+}

@@ -42,6 +42,7 @@ pub struct Policy {
 #[derive(Clone, Debug, Default)]
 pub struct ActWorkspace<T> {
     network: Workspace<T>,
+    std: Vec<T>,
     means: Vec<T>,
     actions: Vec<T>,
     log_probs: Vec<T>,
@@ -164,6 +165,7 @@ impl Policy {
         self.run_actor(parameters, observations, batch, workspace);
         self.run_critic(parameters, observations, batch, workspace);
         let ActWorkspace {
+            std,
             means,
             actions,
             log_probs,
@@ -171,17 +173,13 @@ impl Policy {
             ..
         } = workspace;
         let log_std = &parameters[self.log_std_range()];
+        let width = log_std.len();
+        std.clear();
+        std.extend(log_std.iter().map(|s| s.exp()));
         actions.clear();
-        for (mean, noise) in means
-            .chunks_exact(log_std.len())
-            .zip(noise.chunks_exact(log_std.len()))
-        {
-            actions.extend(
-                mean.iter()
-                    .zip(noise)
-                    .zip(log_std)
-                    .map(|((&m, &n), s)| m + s.exp() * n),
-            );
+        for (mean, noise) in means.chunks_exact(width).zip(noise.chunks_exact(width)) {
+            let row = mean.iter().zip(noise).zip(&*std);
+            actions.extend(row.map(|((&m, &n), &s)| m + s * n));
         }
         log_probs.clear();
         log_probs.extend(
