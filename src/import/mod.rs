@@ -9,6 +9,7 @@ mod deepmimic;
 mod detect;
 mod error;
 mod facing;
+mod gltf;
 mod rigid;
 pub(crate) mod fbx;
 mod scene;
@@ -19,6 +20,7 @@ mod tree;
 pub use axes::{UnknownAxis, UpAxis};
 pub use deepmimic::DeepMimicError;
 pub use error::Error;
+pub use gltf::GltfError;
 
 use crate::clip::{Clip, Grid, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity, Source};
 use canonical::Rig;
@@ -110,24 +112,35 @@ pub fn read(
     Ok(clip)
 }
 
-/// The reader of each format.
-fn open(bytes: &[u8], file: &str, _folder: Option<&Path>) -> Result<Box<dyn Scene>, Error> {
+/// Hands the bytes to the reader of their format.
+fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene>, Error> {
+    let owned = || file.to_owned();
     let format = detect::detect(bytes).map_err(|reason| Error::Unsupported {
-        file: file.to_owned(),
+        file: owned(),
         reason,
     })?;
-    match format {
-        Format::DeepMimic => deepmimic::read(bytes, stem(file))
-            .map(|scene| Box::new(scene) as Box<dyn Scene>)
-            .map_err(|source| Error::DeepMimic {
-                file: file.to_owned(),
+    let gltf = |source| Error::Gltf {
+        file: owned(),
+        source,
+    };
+    Ok(match format {
+        Format::Glb => Box::new(gltf::read_glb(bytes, folder).map_err(gltf)?),
+        Format::Gltf => Box::new(gltf::read_json(bytes, folder).map_err(gltf)?),
+        Format::DeepMimic => {
+            let read = deepmimic::read(bytes, stem(file));
+            Box::new(read.map_err(|source| Error::DeepMimic {
+                file: owned(),
                 source,
-            }),
-        Format::Glb | Format::Gltf | Format::Fbx => Err(Error::Unsupported {
-            file: file.to_owned(),
-            reason: "a format without a reader".to_owned(),
-        }),
-    }
+            })?)
+        }
+        Format::Fbx => {
+            let reason = "binary FBX has no reader in this build; convert it to glTF".to_owned();
+            return Err(Error::Unsupported {
+                file: owned(),
+                reason,
+            });
+        }
+    })
 }
 
 fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {

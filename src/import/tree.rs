@@ -6,7 +6,7 @@ use super::scene::{Node, Scene};
 ///
 /// Where the file marks bones, these are the bones and all nodes above them, whose motion carries them. Otherwise
 /// they are the nodes that some take moves, with all nodes above and below, less leaves that no take moves and
-/// that hold a mesh, camera or light.
+/// that hold a mesh, camera or light; and all nodes but such leaves where nothing moves.
 pub(crate) fn joints(scene: &dyn Scene) -> Vec<usize> {
     let nodes = scene.nodes();
     let mut animated = vec![false; nodes.len()];
@@ -18,6 +18,8 @@ pub(crate) fn joints(scene: &dyn Scene) -> Vec<usize> {
     let bones: Vec<bool> = nodes.iter().map(|node| node.is_bone).collect();
     let kept = if bones.contains(&true) {
         with_ancestors(nodes, bones)
+    } else if !animated.contains(&true) {
+        without_loose_leaves(nodes, vec![true; nodes.len()], &animated)
     } else {
         let below = with_descendants(nodes, animated.clone());
         without_loose_leaves(nodes, with_ancestors(nodes, below), &animated)

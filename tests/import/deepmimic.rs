@@ -1,20 +1,12 @@
 //! DeepMimic motions against a direct evaluation of the format's formulas, in its own axes (Y up, X forward).
 
+use super::data;
 use mimic::clip::LoopMode;
 use mimic::import::{self, Options};
 use nalgebra::Vector3;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 type Matrix = [[f64; 3]; 3];
-
-fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(name);
-    if !path.exists() {
-        eprintln!("skipped: no {}", path.display());
-        return None;
-    }
-    Some(path)
-}
 
 fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|r| std::array::from_fn(|c| (0..3).map(|k| a[r][k] * b[k][c]).sum()))

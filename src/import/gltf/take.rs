@@ -1,0 +1,174 @@
+//! One animation of a glTF file: the curves that move its nodes.
+
+use super::GltfError;
+use super::accessor::Accessors;
+use super::curve::Curve;
+use super::document::{Animation, Sampler};
+use super::rate;
+use super::tree::{Placement, Tree};
+use crate::clip::{Problem, Severity};
+use crate::import::scene::Take;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// What moves one node.
+#[derive(Default)]
+struct NodeCurves {
+    translation: Option<Curve<3>>,
+    rotation: Option<Curve<4>>,
+    scale: Option<Curve<3>>,
+}
+
+/// What moves the nodes of a take, by their place in the tree.
+#[derive(Default)]
+pub(super) struct Curves {
+    nodes: BTreeMap<usize, NodeCurves>,
+}
+
+impl NodeCurves {
+    fn times(&self) -> impl Iterator<Item = &[f64]> {
+        let vectors = [&self.translation, &self.scale]
+            .into_iter()
+            .flatten()
+            .map(Curve::times);
+        vectors.chain(self.rotation.as_ref().map(Curve::times))
+    }
+}
+
+impl Curves {
+    /// What `node`, which stands at `rest`, does at `time`; `None` if nothing moves it.
+    pub fn placement(&self, node: usize, rest: &Placement, time: f64) -> Option<Placement> {
+        let curves = self.nodes.get(&node)?;
+        let vector = |curve: &Option<Curve<3>>, rest: Vector3<f64>| {
+            curve
+                .as_ref()
+                .map_or(rest, |curve| Vector3::from(curve.at(time)))
+        };
+        Some(Placement {
+            translation: vector(&curves.translation, rest.translation),
+            rotation: curves
+                .rotation
+                .as_ref()
+                .map_or(rest.rotation, |curve| curve.rotation(time)),
+            scale: vector(&curves.scale, rest.scale),
+        })
+    }
+
+    /// The take over the time that its keys span.
+    pub fn take(&self, name: String) -> Take {
+        let times = || self.nodes.values().flat_map(NodeCurves::times);
+        let start = times()
+            .filter_map(<[f64]>::first)
+            .fold(f64::INFINITY, |a, &b| a.min(b));
+        let end = times()
+            .filter_map(<[f64]>::last)
+            .fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+        let (start, end) = if start <= end {
+            (start, end)
+        } else {
+            (0.0, 0.0)
+        };
+        Take {
+            name,
+            start,
+            end,
+            fps: rate::rate(times()),
+            animated: self.nodes.keys().copied().collect(),
+            wraps: None,
+        }
+    }
+}
+
+/// Reads the curves of an animation. What can't move a joint (morph weights, pointers) is passed over.
+pub(super) fn curves(
+    animation: &Animation,
+    take: &str,
+    tree: &Tree,
+    accessors: &mut Accessors<'_>,
+    problems: &mut Vec<Problem>,
+) -> Result<Curves, GltfError> {
+    let mut curves = Curves::default();
+    for channel in &animation.channels {
+        let Some(node) = channel.target.node else {
+            continue;
+        };
+        let path = match channel.target.path.as_str() {
+            "translation" => "translation",
+            "rotation" => "rotation",
+            "scale" => "scale",
+            _ => continue,
+        };
+        let place = tree
+            .place
+            .get(node)
+            .copied()
+            .ok_or_else(|| GltfError::Tree {
+                node,
+                reason: format!("take `{take}` moves it, but it isn't in the file"),
+            })?;
+        let name = &tree.nodes[place].name;
+        let broken = |reason: String| GltfError::Curve {
+            take: take.to_owned(),
+            node: name.clone(),
+            path,
+            reason,
+        };
+        let sampler = animation.samplers.get(channel.sampler);
+        let sampler = sampler.ok_or_else(|| broken(format!("no sampler {}", channel.sampler)))?;
+        let of_node = curves.nodes.entry(place).or_default();
+        let first = match path {
+            "translation" => keep(
+                &mut of_node.translation,
+                vectors(sampler, accessors, &broken)?,
+            ),
+            "scale" => keep(&mut of_node.scale, vectors(sampler, accessors, &broken)?),
+            _ => keep(
+                &mut of_node.rotation,
+                rotations(sampler, accessors, &broken)?,
+            ),
+        };
+        if !first {
+            problems.push(twice(take, name, path));
+        }
+    }
+    Ok(curves)
+}
+
+/// Fills an empty place; false where it was taken.
+fn keep<T>(place: &mut Option<T>, value: T) -> bool {
+    let empty = place.is_none();
+    place.get_or_insert(value);
+    empty
+}
+
+fn vectors(
+    sampler: &Sampler,
+    accessors: &mut Accessors<'_>,
+    broken: &dyn Fn(String) -> GltfError,
+) -> Result<Curve<3>, GltfError> {
+    let times = accessors.read(sampler.input, "SCALAR")?;
+    let values = accessors.read(sampler.output, "VEC3")?;
+    Curve::new(times, values, sampler.interpolation).map_err(broken)
+}
+
+fn rotations(
+    sampler: &Sampler,
+    accessors: &mut Accessors<'_>,
+    broken: &dyn Fn(String) -> GltfError,
+) -> Result<Curve<4>, GltfError> {
+    let times = accessors.read(sampler.input, "SCALAR")?;
+    let values = accessors.read(sampler.output, "VEC4")?;
+    let curve = Curve::<4>::new(times, values, sampler.interpolation).map_err(broken)?;
+    match curve.zero_key() {
+        Some(key) => Err(broken(format!("the rotation of key {key} is zero"))),
+        None => Ok(curve),
+    }
+}
+
+fn twice(take: &str, node: &str, path: &str) -> Problem {
+    Problem {
+        id: "curve-given-twice".to_owned(),
+        severity: Severity::Warning,
+        message: format!("take `{take}` moves the {path} of `{node}` twice; the first counts"),
+    }
+}

@@ -1,0 +1,164 @@
+//! The node tree, parents before children, and how each node stands in its parent.
+
+use super::GltfError;
+use super::curve::unit;
+use super::document::{Document, Node};
+use crate::import::rigid::rotation_of;
+use crate::import::scene;
+use nalgebra::{Matrix4, Rotation3, UnitQuaternion, Vector3};
+
+/// Translation, rotation and scale of a node in its parent.
+#[derive(Clone, Copy)]
+pub(super) struct Placement {
+    pub translation: Vector3<f64>,
+    pub rotation: UnitQuaternion<f64>,
+    pub scale: Vector3<f64>,
+}
+
+/// A node's own transform. A matrix may hold shear, which the three parts can't.
+pub(super) struct Rest {
+    pub placement: Placement,
+    matrix: Option<Matrix4<f64>>,
+}
+
+/// The nodes of a file in an order in which parents come first.
+pub(super) struct Tree {
+    pub nodes: Vec<scene::Node>,
+    pub rest: Vec<Rest>,
+    /// Place in `nodes` of every node of the file.
+    pub place: Vec<usize>,
+}
+
+impl Placement {
+    pub fn matrix(&self) -> Matrix4<f64> {
+        let mut matrix = self.rotation.to_homogeneous();
+        for (axis, &scale) in self.scale.iter().enumerate() {
+            matrix.column_mut(axis).scale_mut(scale);
+        }
+        matrix
+            .fixed_view_mut::<3, 1>(0, 3)
+            .copy_from(&self.translation);
+        matrix
+    }
+}
+
+impl Rest {
+    pub fn matrix(&self) -> Matrix4<f64> {
+        self.matrix.unwrap_or_else(|| self.placement.matrix())
+    }
+
+    fn new(node: &Node) -> Self {
+        let matrix = node.matrix.map(|m| Matrix4::from_column_slice(&m));
+        let placement = match &matrix {
+            Some(matrix) => parts(matrix),
+            None => Placement {
+                translation: node.translation.map_or_else(Vector3::zeros, Vector3::from),
+                rotation: node.rotation.and_then(unit).unwrap_or_default(),
+                scale: node
+                    .scale
+                    .map_or_else(|| Vector3::repeat(1.0), Vector3::from),
+            },
+        };
+        Self { placement, matrix }
+    }
+}
+
+/// The parts of a matrix, for nodes that are animated against the specification.
+fn parts(matrix: &Matrix4<f64>) -> Placement {
+    let linear = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+    let turn = rotation_of(&linear).unwrap_or_else(Rotation3::identity);
+    let scale = (turn.matrix().transpose() * linear).diagonal();
+    Placement {
+        translation: matrix.fixed_view::<3, 1>(0, 3).into_owned(),
+        rotation: UnitQuaternion::from_rotation_matrix(&turn),
+        scale,
+    }
+}
+
+/// Orders the nodes, after finding that they form trees.
+pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
+    let parents = parents(document)?;
+    let order = order(document, &parents)?;
+    let mut place = vec![0; order.len()];
+    for (at, &node) in order.iter().enumerate() {
+        place[node] = at;
+    }
+    let mut bone = vec![false; order.len()];
+    let skinned = document
+        .skins
+        .iter()
+        .flat_map(|skin| skin.joints.iter().copied());
+    for node in skinned.chain(document.extensions.bones()) {
+        let mark = bone.get_mut(node).ok_or_else(|| missing(node))?;
+        *mark = true;
+    }
+    let about = |&node: &usize| {
+        let source = &document.nodes[node];
+        let light = source.extensions.contains_key("KHR_lights_punctual");
+        scene::Node {
+            name: source
+                .name
+                .clone()
+                .unwrap_or_else(|| format!("node {node}")),
+            parent: parents[node].map(|parent| place[parent]),
+            is_bone: bone[node],
+            is_plain: source.mesh.is_none() && source.camera.is_none() && !light,
+        }
+    };
+    let nodes = order.iter().map(about).collect();
+    let rest = order
+        .iter()
+        .map(|&node| Rest::new(&document.nodes[node]))
+        .collect();
+    Ok(Tree { nodes, rest, place })
+}
+
+fn missing(node: usize) -> GltfError {
+    GltfError::Tree {
+        node,
+        reason: "it is named but isn't in the file".to_owned(),
+    }
+}
+
+fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
+    let mut parents = vec![None; document.nodes.len()];
+    for (parent, node) in document.nodes.iter().enumerate() {
+        for &child in &node.children {
+            let slot = parents.get_mut(child).ok_or_else(|| missing(child))?;
+            if slot.replace(parent).is_some() {
+                let reason = "it has several parents".to_owned();
+                return Err(GltfError::Tree {
+                    node: child,
+                    reason,
+                });
+            }
+        }
+    }
+    Ok(parents)
+}
+
+/// Nodes from the roots downward, each root's tree in the file's order. Nodes that no root reaches form a cycle.
+fn order(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, GltfError> {
+    let roots = (0..parents.len())
+        .rev()
+        .filter(|&node| parents[node].is_none());
+    let mut waiting: Vec<usize> = roots.collect();
+    let mut order = Vec::with_capacity(parents.len());
+    while let Some(node) = waiting.pop() {
+        order.push(node);
+        waiting.extend(document.nodes[node].children.iter().rev());
+    }
+    if order.len() == parents.len() {
+        return Ok(order);
+    }
+    let mut reached = vec![false; parents.len()];
+    order.iter().for_each(|&node| reached[node] = true);
+    let node = reached
+        .iter()
+        .position(|&reached| !reached)
+        .unwrap_or_default();
+    Err(GltfError::Tree {
+        node,
+        reason: "it is its own ancestor".to_owned(),
+    })
+}

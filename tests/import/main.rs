@@ -1,0 +1,17 @@
+//! Importers against evaluations of the formats' own formulas that share no code with them.
+
+mod deepmimic;
+mod gltf;
+mod robust;
+
+use std::path::{Path, PathBuf};
+
+/// A file of the collection of real clips that may lie beside the repository.
+fn data(name: &str) -> Option<PathBuf> {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(name);
+    if !path.exists() {
+        eprintln!("skipped: no {}", path.display());
+        return None;
+    }
+    Some(path)
+}
