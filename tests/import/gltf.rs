@@ -651,9 +651,10 @@ fn sparse_and_normalised_accessors_mean_what_they_say() {
     let clip = read(&text).expect("it imports");
     assert!((clip.world(30)[1].translation.vector + Vector3::y()).norm() < 1e-4);
     assert!((clip.world(0)[1].translation.vector - Vector3::z()).norm() < 1e-12);
+    // Two quaternion parts, 23170 each, read as indices.
     let far = text.replace(
-        "\"bufferView\":2,\"componentType\":5123",
-        "\"bufferView\":3,\"componentType\":5123",
+        r#""indices":{"bufferView":2"#,
+        r#""indices":{"bufferView":3,"byteOffset":12"#,
     );
     assert!(
         read(&far)

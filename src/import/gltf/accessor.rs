@@ -49,6 +49,14 @@ impl<'a> Accessors<'a> {
         }
     }
 
+    /// Whether the file has this accessor and nothing is in it.
+    pub fn is_empty(&self, accessor: usize) -> bool {
+        self.document
+            .accessors
+            .get(accessor)
+            .is_some_and(|about| about.count == 0)
+    }
+
     /// All numbers of an accessor whose elements are of type `shape` (`SCALAR`, `VEC3`, `VEC4`), in order.
     pub fn read(&mut self, accessor: usize, shape: &str) -> Result<Rc<[f64]>, GltfError> {
         let broken = |reason: String| GltfError::Accessor { accessor, reason };

@@ -115,6 +115,10 @@ pub(super) fn curves(
         };
         let sampler = animation.samplers.get(channel.sampler);
         let sampler = sampler.ok_or_else(|| broken(format!("no sampler {}", channel.sampler)))?;
+        if accessors.is_empty(sampler.input) {
+            problems.push(problem("curve-without-keys", take, name, path));
+            continue;
+        }
         let of_node = curves.nodes.entry(place).or_default();
         let first = match path {
             "translation" => keep(
@@ -128,7 +132,7 @@ pub(super) fn curves(
             ),
         };
         if !first {
-            problems.push(twice(take, name, path));
+            problems.push(problem("curve-given-twice", take, name, path));
         }
     }
     Ok(curves)
@@ -165,10 +169,11 @@ fn rotations(
     }
 }
 
-fn twice(take: &str, node: &str, path: &str) -> Problem {
+/// A curve that isn't used.
+fn problem(id: &str, take: &str, node: &str, path: &str) -> Problem {
     Problem {
-        id: "curve-given-twice".to_owned(),
+        id: id.to_owned(),
         severity: Severity::Warning,
-        message: format!("take `{take}` moves the {path} of `{node}` twice; the first counts"),
+        message: format!("take `{take}` has a curve for the {path} of `{node}` that isn't used"),
     }
 }
