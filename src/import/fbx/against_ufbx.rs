@@ -1,6 +1,7 @@
 //! Every node of every frame of every take of real files, against `ufbx`.
 
-use super::{FbxScene, read};
+use super::rewritten::as_binary;
+use super::{FbxError, FbxScene, read};
 use crate::import::scene::Scene;
 use nalgebra::{Matrix4, Vector3};
 use std::collections::BTreeMap;
@@ -89,17 +90,53 @@ fn compare(ours: &Worlds, theirs: &Worlds, unit_m: f64, place: &str) -> (f64, f6
     worst
 }
 
-fn check(file: &str) {
+/// A file as we and as ufbx read it.
+fn open(file: &str) -> Option<(FbxScene, ufbx::SceneRoot)> {
     let Ok(bytes) = std::fs::read(Path::new(DATA).join(file)) else {
         eprintln!("skipped: {file} isn't there");
-        return;
+        return None;
     };
-    let scene = read(&bytes).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let scene = match read(&bytes) {
+        Err(FbxError::Ascii) => read(&as_binary(&bytes)),
+        scene => scene,
+    };
     let options = ufbx::LoadOpts {
         ignore_geometry: true,
         ..Default::default()
     };
     let oracle = ufbx::load_memory(&bytes, options).expect("ufbx reads the file");
+    Some((
+        scene.unwrap_or_else(|error| panic!("{file}: {error}")),
+        oracle,
+    ))
+}
+
+/// Compares all nodes at `time` of the take `index`.
+fn check_moment(
+    scene: &FbxScene,
+    oracle: &ufbx::Scene,
+    index: usize,
+    time: f64,
+    place: &str,
+) -> (f64, f64) {
+    // The oracle isn't told to take times to the nearest tick.
+    let ticks = oracle.metadata.ktime_second as f64;
+    let snapped = (time * ticks).round() / ticks;
+    let anim = &oracle.anim_stacks[index].anim;
+    let evaluated =
+        ufbx::evaluate_scene(oracle, anim, snapped, Default::default()).expect("ufbx evaluates");
+    compare(
+        &ours(scene, Some((index, time))),
+        &theirs(&evaluated),
+        scene.unit_m(),
+        place,
+    )
+}
+
+fn check(file: &str) {
+    let Some((scene, oracle)) = open(file) else {
+        return;
+    };
     let mut worst = compare(
         &ours(&scene, None),
         &theirs(&oracle),
@@ -125,18 +162,8 @@ fn check(file: &str) {
         }
         for frame in 0..=((take.end - take.start) * take.fps).round() as usize {
             let time = take.start + frame as f64 / take.fps;
-            // The oracle isn't told to take times to the nearest tick.
-            let ticks = oracle.metadata.ktime_second as f64;
-            let snapped = (time * ticks).round() / ticks;
-            let evaluated = ufbx::evaluate_scene(&oracle, &stack.anim, snapped, Default::default())
-                .expect("ufbx evaluates");
             let place = format!("{file}, take {}, frame {frame}", take.name);
-            let found = compare(
-                &ours(&scene, Some((index, time))),
-                &theirs(&evaluated),
-                scene.unit_m(),
-                &place,
-            );
+            let found = check_moment(&scene, &oracle, index, time, &place);
             worst = (worst.0.max(found.0), worst.1.max(found.1));
             frames += 1;
         }
@@ -147,6 +174,51 @@ fn check(file: &str) {
         worst.0 * 1e3,
         worst.1
     );
+}
+
+/// Its span of 92 hours isn't sampled frame by frame.
+#[test]
+fn torture_maya_long_keyframes() {
+    let file = "torture-fbx/maya_long_keyframes_7700_binary.fbx";
+    let Some((scene, oracle)) = open(file) else {
+        return;
+    };
+    let stack = &oracle.anim_stacks[0];
+    for sample in 0..=5000 {
+        let time =
+            stack.time_begin + (stack.time_end - stack.time_begin) * f64::from(sample) / 5000.0;
+        check_moment(&scene, &oracle, 0, time, &format!("{file}, {time} s"));
+    }
+    assert!(
+        scene
+            .problems()
+            .iter()
+            .any(|problem| problem.id == "cut-take")
+    );
+}
+
+/// Extrapolation and the time between frames: each take sampled at odd times, from before its start to after its end.
+#[test]
+fn between_and_beyond_frames() {
+    for file in [
+        "mixamo/locomotion-pack/walking.fbx",
+        "torture-fbx/maya_anim_interpolation_7700_binary.fbx",
+        "torture-fbx/maya_anim_layers_7500_binary.fbx",
+        "torture-fbx/maya_auto_clamp_7100_ascii.fbx",
+        "torture-fbx/maya_game_sausage_7500_binary_combined.fbx",
+        "torture-fbx/motionbuilder_tangent_tcb_7700_ascii.fbx",
+    ] {
+        let Some((scene, oracle)) = open(file) else {
+            return;
+        };
+        for (index, take) in scene.takes().iter().enumerate() {
+            let length = take.end - take.start;
+            for sample in 0..211 {
+                let time = take.start + length * (f64::from(sample) * 0.01 - 0.55);
+                check_moment(&scene, &oracle, index, time, &format!("{file}, {time} s"));
+            }
+        }
+    }
 }
 
 macro_rules! files {
@@ -189,4 +261,13 @@ files! {
     torture_maya_resampled: "torture-fbx/maya_resampled_7500_binary.fbx";
     torture_maya_rotation_order: "torture-fbx/maya_rotation_order_7500_binary.fbx";
     torture_maya_tangent_sign: "torture-fbx/maya_tangent_sign_7700_binary.fbx";
+    ascii_casegen_rotation_space: "torture-fbx/casegen_rotation_space_7500_ascii.fbx";
+    ascii_maya_anim_layers_over_acc: "torture-fbx/maya_anim_layers_over_acc_7500_ascii.fbx";
+    ascii_maya_auto_clamp: "torture-fbx/maya_auto_clamp_7100_ascii.fbx";
+    ascii_maya_axes_anim: "torture-fbx/maya_axes_anim_7700_ascii.fbx";
+    ascii_maya_mixed_inherit_mode: "torture-fbx/maya_mixed_inherit_mode_7700_ascii.fbx";
+    ascii_maya_null_pivots: "torture-fbx/maya_null_pivots_7700_ascii.fbx";
+    ascii_motionbuilder_tangent_tcb: "torture-fbx/motionbuilder_tangent_tcb_7700_ascii.fbx";
+    ascii_synthetic_pre_post_rotate: "torture-fbx/synthetic_pre_post_rotate_7500_ascii.fbx";
+    ascii_synthetic_tcdefinition: "torture-fbx/synthetic_tcdefinition_127_7100_ascii.fbx";
 }

@@ -1,28 +1,19 @@
-//! Animation curves: keys read from the file, and values between and beyond them.
+//! Animation curves: values at, between and beyond the keys.
 
-use super::document::{Array, Element};
-use super::tangent::{Attribute, Step, THIRD, slopes};
-use std::iter::repeat_n;
-
-const CONSTANT: u32 = 0x2;
-const CUBIC: u32 = 0x8;
-const CONSTANT_NEXT: u32 = 0x100;
-/// Attribute of keys in files that give none.
-const LINEAR: Attribute = Attribute {
-    flags: 0x4,
-    data: [0; 4],
-};
+use super::document::Element;
+use super::keys::{beyond, keys, raw_keys};
+use super::tangent::THIRD;
 
 #[derive(Clone, Copy, Debug)]
-struct Key {
-    tick: f64,
-    value: f64,
+pub(super) struct Key {
+    pub tick: f64,
+    pub value: f64,
     /// How the curve runs from this key to the next.
-    segment: Segment,
+    pub segment: Segment,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Segment {
+pub(super) enum Segment {
     Hold,
     HoldNext,
     Line,
@@ -31,16 +22,16 @@ enum Segment {
 
 /// A Bezier handle, seen from its key towards the inside of the segment.
 #[derive(Clone, Copy, Debug)]
-struct Handle {
+pub(super) struct Handle {
     /// Fraction of the segment's time.
-    weight: f64,
+    pub weight: f64,
     /// Value of the curve that the tangent gains over the handle's time, in the direction of time.
-    rise: f64,
+    pub rise: f64,
 }
 
 /// What a curve does before its first or after its last key.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Beyond {
+pub(super) enum Beyond {
     Hold,
     Slope,
     Cycle {
@@ -58,12 +49,6 @@ pub(super) struct Curve {
     after: Beyond,
     /// Keys were out of order or not finite.
     pub mended: bool,
-}
-
-struct RawKey {
-    tick: f64,
-    value: f64,
-    attribute: Attribute,
 }
 
 impl Curve {
@@ -289,163 +274,4 @@ fn bezier_parameter(x1: f64, x2: f64, x: f64) -> f64 {
         };
     }
     t
-}
-
-fn raw_keys(record: &Element, budget: &mut usize) -> Result<Vec<RawKey>, &'static str> {
-    let (Some(times), Some(values)) = (record.array("KeyTime"), record.array("KeyValueFloat"))
-    else {
-        return Ok(Vec::new());
-    };
-    let (times, values) = (times.integers(budget)?, values.reals(budget)?);
-    if times.len() != values.len() {
-        return Err("a curve has different numbers of times and values");
-    }
-    let attributes = attributes(record, times.len(), budget)?;
-    let keys = times.into_iter().zip(values).zip(attributes);
-    Ok(keys
-        .map(|((time, value), attribute)| RawKey {
-            tick: time as f64,
-            value,
-            attribute,
-        })
-        .collect())
-}
-
-/// One attribute per key, from the run-length form of the file.
-fn attributes(
-    record: &Element,
-    count: usize,
-    budget: &mut usize,
-) -> Result<Vec<Attribute>, &'static str> {
-    let find = |name| record.array(name).filter(|_| count > 0);
-    let (Some(flags), Some(data), Some(runs)) = (
-        find("KeyAttrFlags"),
-        find("KeyAttrDataFloat"),
-        find("KeyAttrRefCount"),
-    ) else {
-        return Ok(vec![LINEAR; count]);
-    };
-    let mut read = |array: Array| array.words(budget);
-    let (flags, data, runs) = (read(flags)?, read(data)?, read(runs)?);
-    if flags.len() != runs.len() || data.len() != 4 * runs.len() {
-        return Err("a curve has different numbers of key attributes");
-    }
-    let runs =
-        runs.iter()
-            .zip(flags)
-            .zip(data.chunks_exact(4))
-            .flat_map(|((&run, flags), data)| {
-                repeat_n(
-                    Attribute {
-                        flags,
-                        data: [data[0], data[1], data[2], data[3]],
-                    },
-                    run as usize,
-                )
-            });
-    let attributes: Vec<_> = runs.take(count).collect();
-    if attributes.len() == count {
-        Ok(attributes)
-    } else {
-        Err("a curve has too few key attributes")
-    }
-}
-
-fn keys(raw: &[RawKey], ticks: f64) -> Vec<Key> {
-    let step = |a: &RawKey, b: &RawKey, weight: f64| {
-        let time = (b.tick - a.tick) / ticks;
-        (time > 0.0).then_some(Step {
-            time,
-            rise: b.value - a.value,
-            weight,
-        })
-    };
-    let sides: Vec<_> = (0..raw.len())
-        .map(|i| {
-            let (own, previous) = (&raw[i], i.checked_sub(1).map(|p| &raw[p]));
-            let before = previous.and_then(|p| step(p, own, p.attribute.next_left_weight()));
-            let after = raw
-                .get(i + 1)
-                .and_then(|n| step(own, n, own.attribute.right_weight()));
-            slopes_of(own, previous, before, after)
-        })
-        .collect();
-    (0..raw.len())
-        .map(|i| {
-            let arriving = sides.get(i + 1).map_or(0.0, |side| side.0);
-            let seconds = raw
-                .get(i + 1)
-                .map_or(0.0, |next| (next.tick - raw[i].tick) / ticks);
-            let segment = segment(&raw[i].attribute, sides[i].1, arriving, seconds);
-            Key {
-                tick: raw[i].tick,
-                value: raw[i].value,
-                segment,
-            }
-        })
-        .collect()
-}
-
-/// A key that isn't cubic itself still ends a cubic segment, with the slope that the key before it holds.
-fn slopes_of(
-    own: &RawKey,
-    previous: Option<&RawKey>,
-    before: Option<Step>,
-    after: Option<Step>,
-) -> (f64, f64) {
-    const USER: u32 = 0x400;
-    let mut attribute = own.attribute;
-    if is_constant(&attribute) || !attribute.has(CUBIC) {
-        attribute.flags = USER;
-    }
-    slopes(before, after, previous.map(|key| key.attribute), attribute)
-}
-
-fn is_constant(attribute: &Attribute) -> bool {
-    attribute.has(CONSTANT)
-}
-
-fn segment(attribute: &Attribute, leaving: f64, arriving: f64, seconds: f64) -> Segment {
-    if is_constant(attribute) {
-        return if attribute.has(CONSTANT_NEXT) {
-            Segment::HoldNext
-        } else {
-            Segment::Hold
-        };
-    }
-    if !attribute.has(CUBIC) {
-        return Segment::Line;
-    }
-    let handle = |weight: f64, slope: f64| Handle {
-        weight,
-        rise: slope * weight * seconds,
-    };
-    Segment::Cubic {
-        leave: handle(attribute.right_weight(), leaving),
-        arrive: handle(attribute.next_left_weight(), arriving),
-    }
-}
-
-fn beyond(record: &Element) -> Beyond {
-    // The type is one letter, written as a character code.
-    let kind = record
-        .child("Type")
-        .and_then(|kind| kind.int(0))
-        .and_then(|code| u8::try_from(code).ok());
-    let repeats = record.child("Repetition").and_then(|count| count.int(0));
-    let repeats = repeats
-        .filter(|&count| count >= 0)
-        .map(|count| count as f64);
-    let cycle = |mirror, climb| Beyond::Cycle {
-        repeats,
-        mirror,
-        climb,
-    };
-    match kind {
-        Some(b'K') => Beyond::Slope,
-        Some(b'R') => cycle(false, false),
-        Some(b'M') => cycle(true, false),
-        Some(b'A') => cycle(false, true),
-        _ => Beyond::Hold,
-    }
 }

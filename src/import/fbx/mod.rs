@@ -3,6 +3,7 @@
 mod curve;
 mod document;
 mod inflate;
+mod keys;
 mod layers;
 mod nodes;
 mod objects;
@@ -14,6 +15,8 @@ mod transform;
 
 #[cfg(test)]
 mod against_ufbx;
+#[cfg(test)]
+mod rewritten;
 
 use crate::clip::{Problem, Severity};
 use crate::import::scene::{Node, Scene, Take};

@@ -7,7 +7,7 @@ use crate::clip::{Problem, Severity};
 use crate::import::scene::Take;
 use std::collections::BTreeMap;
 
-/// Spans beyond this are unset markers, not takes.
+/// Longer spans are unset markers, not takes.
 const MAX_SECONDS: f64 = 6.0 * 3600.0;
 const FALLBACK_FPS: f64 = 30.0;
 
@@ -79,9 +79,10 @@ fn span(properties: &Properties, keyed: Option<(f64, f64)>, ticks: f64) -> (f64,
         stated("ReferenceStart", "ReferenceStop"),
         keyed.map(|(first, last)| (first / ticks, last / ticks)),
     ];
-    let sane =
-        |&(start, end): &(f64, f64)| end - start <= MAX_SECONDS && start.abs() <= 1e3 * MAX_SECONDS;
-    spans.into_iter().flatten().find(sane).unwrap_or((0.0, 0.0))
+    let sane = |&(start, end): &(f64, f64)| end - start <= MAX_SECONDS;
+    let cut = || spans[2].map(|(start, _)| (start, start + MAX_SECONDS));
+    let whole = spans.into_iter().flatten().find(sane);
+    whole.or_else(cut).unwrap_or((0.0, 0.0))
 }
 
 /// Frame rate of the keys' most common spacing; of equally common ones, the fastest.
@@ -125,7 +126,12 @@ pub(super) fn problems(
     if take.animated.is_empty() {
         note("empty-take", format!("take `{}` moves nothing", take.name));
     }
-    if let Some((first, last)) = key_range(animation, nodes, curves) {
+    if take.end - take.start == MAX_SECONDS {
+        note(
+            "cut-take",
+            format!("take `{}` is cut to its first six hours", take.name),
+        );
+    } else if let Some((first, last)) = key_range(animation, nodes, curves) {
         let (first, last, frame) = (first / ticks, last / ticks, 1.0 / take.fps);
         if first < take.start - frame || last > take.end + frame {
             note(
