@@ -68,7 +68,11 @@ fn motion(clip: &str) -> Option<(Skeleton, Motion)> {
     let draft = Draft {
         name: clip.into(),
         fps: 1.0 / rows[0][0],
-        loop_mode: if wrap { LoopMode::Wrap } else { LoopMode::Clamp },
+        loop_mode: if wrap {
+            LoopMode::Wrap
+        } else {
+            LoopMode::Clamp
+        },
         cycle: Cycle {
             translation: if wrap { travel } else { Vector3::zeros() },
             heading: 0.0,
@@ -81,18 +85,72 @@ fn motion(clip: &str) -> Option<(Skeleton, Motion)> {
     Some((skeleton.clone(), Motion::from_poses(&skeleton, draft)))
 }
 
+fn stance_share(motion: &Motion, foot: usize) -> f64 {
+    let cycle = &motion.tracks.contact[1..];
+    cycle.iter().filter(|row| row[foot]).count() as f64 / cycle.len() as f64
+}
+
+/// Residual force in body weights, per frame.
+fn residual_force(skeleton: &Skeleton, motion: &Motion) -> Vec<f64> {
+    let weight = skeleton.total_mass() * 9.81;
+    let residuals = motion.tracks.root_wrench_residual.iter();
+    residuals
+        .map(|w| w.fixed_rows::<3>(0).norm() / weight)
+        .collect()
+}
+
+/// People walk with each foot down for about 60 % of the stride, and never fly (Perry, Gait Analysis).
 #[test]
-fn print() {
-    for clip in ["walk","run","jog","kick","spinkick","backflip","jump","cartwheel","dance_a","punch"] {
-        let Some((s, m)) = motion(clip) else { return };
-        let weight = s.total_mass() * 9.81;
-        for c in 0..2 {
-            println!("{clip} {c} {}", m.tracks.contact.iter().map(|r| if r[c] {'#'} else {'.'}).collect::<String>());
-        }
-        let low: Vec<f64> = m.bodies.iter().map(|p| s.lowest_point(p)).collect();
-        println!("lowest {:.3} {:.3}", low.iter().copied().fold(9.0, f64::min), low.iter().copied().fold(-9.0, f64::max));
-        let f: Vec<f64> = m.tracks.root_wrench_residual.iter().map(|w| w.fixed_rows::<3>(0).norm()/weight).collect();
-        let t: Vec<f64> = m.tracks.root_wrench_residual.iter().map(|w| w.fixed_rows::<3>(3).norm()).collect();
-        println!("residual force/weight mean {:.3} max {:.3}; moment mean {:.1} max {:.1} Nm", f.iter().sum::<f64>()/f.len() as f64, f.iter().copied().fold(0.0, f64::max), t.iter().sum::<f64>()/t.len() as f64, t.iter().copied().fold(0.0, f64::max));
+fn a_walk_stands_as_people_do() {
+    let Some((skeleton, walk)) = motion("walk") else {
+        return;
+    };
+    for foot in 0..2 {
+        let share = stance_share(&walk, foot);
+        assert!((0.5..0.7).contains(&share), "foot {foot} stands {share}");
     }
+    assert!(walk.tracks.contact.iter().all(|row| row[0] || row[1]));
+    let residual = residual_force(&skeleton, &walk);
+    let mean = residual.iter().sum::<f64>() / residual.len() as f64;
+    assert!(
+        mean < 0.1,
+        "a recorded walk needs {mean} body weights of help"
+    );
+}
+
+/// Runners fly twice per stride; each foot is down for less than half of it.
+#[test]
+fn a_run_flies() {
+    for clip in ["run", "jog"] {
+        let Some((_, run)) = motion(clip) else {
+            return;
+        };
+        let flying = |row: &Vec<bool>| !row[0] && !row[1];
+        assert!(run.tracks.contact.iter().filter(|r| flying(r)).count() >= 4);
+        for foot in 0..2 {
+            let share = stance_share(&run, foot);
+            assert!(
+                (0.1..0.45).contains(&share),
+                "{clip}: foot {foot} stands {share}"
+            );
+        }
+    }
+}
+
+/// Nothing but gravity acts in flight, so a recorded jump must be nearly ballistic there.
+#[test]
+fn a_jump_falls_freely() {
+    let Some((skeleton, jump)) = motion("jump") else {
+        return;
+    };
+    let residual = residual_force(&skeleton, &jump);
+    let standing = |f: usize| jump.tracks.contact[f].iter().any(|c| *c);
+    let reach = 6;
+    let flight: Vec<f64> = (reach..residual.len() - reach)
+        .filter(|&f| (f - reach..=f + reach).all(|g| !standing(g)))
+        .map(|f| residual[f])
+        .collect();
+    assert!(flight.len() > 5);
+    let mean = flight.iter().sum::<f64>() / flight.len() as f64;
+    assert!(mean < 0.2, "{mean} body weights in flight");
 }

@@ -1,9 +1,10 @@
 //! When a foot stands on the ground, from the paths of its points.
 //!
 //! A point stands while it is slow and low. All lengths are in leg lengths and all times in seconds, so that a
-//! child's walk at 30 Hz and a giant's at 120 Hz get the same labels. Velocities are averaged over 1/30 s; a stance
-//! has to be clearly slow and low somewhere, and extends as far as it stays fairly so (hysteresis, the same in both
-//! directions of time); short gaps are closed and short touches dropped.
+//! child's walk at 30 Hz and a giant's at 120 Hz get the same labels. Velocities are averaged over 1/30 s before and
+//! after a frame, the slower of which counts: a foot stands from the frame in which it comes to rest. A stance has to
+//! be clearly slow and low somewhere, and extends as far as it stays fairly so (hysteresis, the same in both directions
+//! of time); short gaps are closed and short touches dropped.
 
 use crate::clip::LoopMode;
 use nalgebra::Vector3;
@@ -92,16 +93,17 @@ fn states(
 ) -> Vec<State> {
     let steps: Vec<Vector3<f64>> = path.windows(2).map(|w| (w[1] - w[0]) * fps).collect();
     let heights: Vec<f64> = path.iter().map(|p| p.z - floor).collect();
+    let reach = (fps * WINDOW).round().max(1.0) as i64;
     let half = (fps * WINDOW / 2.0).floor() as i64;
     (0..path.len() as i64)
         .map(|f| {
-            let reach = half.max(1);
-            let around = window(&steps, f - reach, f + reach, loop_mode);
-            let velocity = around.iter().sum::<Vector3<f64>>() / around.len().max(1) as f64;
+            let before = mean_speed(&steps, f - reach, f, loop_mode);
+            let after = mean_speed(&steps, f, f + reach, loop_mode);
+            let speed = before.min(after);
             let around = window_of_frames(&heights, f - half, f + half, loop_mode);
             let height = around.iter().sum::<f64>() / around.len().max(1) as f64;
             let within = |level: usize| {
-                velocity.norm() < SPEED[level] * leg_length && height < HEIGHT[level] * leg_length
+                speed < SPEED[level] * leg_length && height < HEIGHT[level] * leg_length
             };
             match (within(0), within(1)) {
                 (true, _) => State::Clear,
@@ -110,6 +112,15 @@ fn states(
             }
         })
         .collect()
+}
+
+/// Size of the mean of velocities `from..to`; infinite where there are none.
+fn mean_speed(steps: &[Vector3<f64>], from: i64, to: i64, loop_mode: LoopMode) -> f64 {
+    let around = window(steps, from, to, loop_mode);
+    match around.len() {
+        0 => f64::INFINITY,
+        count => around.iter().sum::<Vector3<f64>>().norm() / count as f64,
+    }
 }
 
 /// Items `from..to` of a sequence that repeats, or that is cut at its ends.

@@ -90,3 +90,6 @@ impl Motion {
         self.cycle.offset(n)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,268 @@
+use super::contact;
+use super::*;
+use crate::skeleton::Skeleton;
+use nalgebra::UnitQuaternion;
+
+fn humanoid() -> Skeleton {
+    Skeleton::load("humanoid").expect("the built-in humanoid is valid")
+}
+
+fn draft(skeleton: &Skeleton, qpos: Vec<Vec<f64>>, fps: f64) -> Draft {
+    let foot = |name: &str| skeleton.bodies.iter().position(|b| b.name == name);
+    Draft {
+        name: "test".into(),
+        fps,
+        loop_mode: LoopMode::Clamp,
+        cycle: Cycle::NONE,
+        qpos,
+        contact_bodies: ["left_foot", "right_foot"]
+            .iter()
+            .filter_map(|n| foot(n))
+            .collect(),
+        contact: None,
+        report: serde_json::json!({ "keypoint_error_m": 0.01 }),
+    }
+}
+
+/// The rest pose carried along by a constant velocity of all coordinates.
+fn steady(skeleton: &Skeleton, qvel: &[f64], frames: usize, fps: f64) -> Vec<Vec<f64>> {
+    let rest = skeleton.rest_qpos();
+    let at = |f: usize| skeleton.integrate(&rest, qvel, f as f64 / fps);
+    (0..frames).map(at).collect()
+}
+
+#[test]
+fn cycles_add_up() {
+    for heading in [0.0, 0.4, -2.0, std::f64::consts::PI] {
+        let cycle = Cycle {
+            translation: Vector3::new(1.0, 0.3, 0.0),
+            heading,
+        };
+        let one = cycle.offset(1);
+        let mut naive = Isometry3::identity();
+        for n in 0..7 {
+            assert!((cycle.offset(n).to_homogeneous() - naive.to_homogeneous()).norm() < 1e-9);
+            let back = cycle.offset(-n) * naive;
+            assert!((back.to_homogeneous() - Isometry3::identity().to_homogeneous()).norm() < 1e-9);
+            naive *= one;
+        }
+    }
+}
+
+/// Walking a circle at constant speed: the velocity is the same in every frame, seam included.
+#[test]
+fn velocities_pass_over_the_seam() {
+    let s = humanoid();
+    let (fps, frames, rate, radius) = (30.0, 16, 0.5, 2.0);
+    let qpos: Vec<Vec<f64>> = (0..frames)
+        .map(|f| {
+            let angle = rate * f as f64 / fps;
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+            let mut q = s.rest_qpos();
+            q[0] = radius * angle.sin();
+            q[1] = radius * (1.0 - angle.cos());
+            q[3..7].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+            q
+        })
+        .collect();
+    let last = &qpos[frames - 1];
+    let cycle = Cycle {
+        translation: Vector3::new(last[0], last[1], 0.0),
+        heading: rate * (frames - 1) as f64 / fps,
+    };
+    let motion = Motion::from_poses(
+        &s,
+        Draft {
+            loop_mode: LoopMode::Wrap,
+            cycle,
+            ..draft(&s, qpos, fps)
+        },
+    );
+    for (f, v) in motion.qvel.iter().enumerate() {
+        let angle = rate * f as f64 / fps;
+        let expected = Vector3::new(angle.cos(), angle.sin(), 0.0) * radius * rate;
+        assert!(
+            (Vector3::new(v[0], v[1], v[2]) - expected).norm() < 1e-3,
+            "frame {f}"
+        );
+        assert!((v[5] - rate).abs() < 1e-9, "frame {f}");
+    }
+    let period = motion.duration();
+    for k in -3..4 {
+        let time = k as f64 * period + 0.2;
+        let q = motion.sample_qpos(&s, time);
+        let angle = rate * time;
+        assert!((q[0] - radius * angle.sin()).abs() < 1e-3);
+        let before = motion.sample_qpos(&s, k as f64 * period - 1e-9);
+        let after = motion.sample_qpos(&s, k as f64 * period + 1e-9);
+        let jump = s.differentiate(&before, &after, 1.0);
+        assert!(jump.iter().all(|d| d.abs() < 1e-6));
+        let bodies = motion.sample_bodies(time);
+        assert!((bodies[0].translation.vector - Vector3::new(q[0], q[1], q[2])).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn one_sided_ends_are_of_second_order() {
+    let s = humanoid();
+    let mut qpos = vec![s.rest_qpos(); 9];
+    for (f, q) in qpos.iter_mut().enumerate() {
+        q[0] = 0.5 * 3.0 * (f as f64 / 10.0).powi(2);
+    }
+    let motion = Motion::from_poses(&s, draft(&s, qpos, 10.0));
+    for (f, v) in motion.qvel.iter().enumerate() {
+        assert!((v[0] - 3.0 * f as f64 / 10.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn standing_is_explained_by_the_feet() {
+    let s = humanoid();
+    let still = steady(&s, &vec![0.0; s.nv], 12, 30.0);
+    let standing = Motion::from_poses(&s, draft(&s, still.clone(), 30.0));
+    assert!(standing.tracks.contact.iter().flatten().all(|c| *c));
+    let weight = s.total_mass() * 9.81;
+    for w in &standing.tracks.root_wrench_residual {
+        assert!(w.norm() < 1e-6 * weight);
+    }
+
+    let none = vec![vec![false; 2]; 12];
+    let lifted = Draft {
+        contact: Some(none),
+        ..draft(&s, still, 30.0)
+    };
+    let held = Motion::from_poses(&s, lifted);
+    let arm = held.tracks.com[0] - held.bodies[0][0].translation.vector;
+    let expected = Vector3::new(0.0, 0.0, weight);
+    for w in &held.tracks.root_wrench_residual {
+        assert!((w.fixed_rows::<3>(0) - expected).norm() < 1e-6);
+        assert!((w.fixed_rows::<3>(3) - arm.cross(&expected)).norm() < 1e-6);
+    }
+}
+
+#[test]
+fn free_fall_needs_nothing() {
+    let s = humanoid();
+    let mut qpos = vec![s.rest_qpos(); 40];
+    for (f, q) in qpos.iter_mut().enumerate() {
+        let t = f as f64 / 60.0;
+        q[0] += 2.0 * t;
+        q[2] += 5.0 + 3.0 * t - 0.5 * 9.81 * t * t;
+    }
+    let motion = Motion::from_poses(&s, draft(&s, qpos, 60.0));
+    assert!(motion.tracks.contact.iter().flatten().all(|c| !c));
+    for w in &motion.tracks.root_wrench_residual {
+        assert!(w.norm() < 1e-6);
+    }
+}
+
+/// A point that rests for 0.6 s and swings for 0.4 s, both at any size and frame rate.
+#[test]
+fn contacts_do_not_depend_on_size_or_frame_rate() {
+    for (size, fps) in [
+        (1.0, 30.0),
+        (1.0, 60.0),
+        (1.0, 120.0),
+        (0.3, 50.0),
+        (10.0, 100.0),
+    ] {
+        let path = |time: f64| {
+            let swing = ((time - 0.6) / 0.4).max(0.0) * std::f64::consts::PI;
+            Vector3::new(1.0 - swing.cos(), 0.0, 0.3 * swing.sin()) * size
+        };
+        let frames = fps as usize + 1;
+        let points: Vec<_> = (0..frames).map(|f| vec![path(f as f64 / fps)]).collect();
+        for labels in [
+            contact::detect(&points, fps, size, LoopMode::Wrap),
+            contact::detect_above(&points, 0.0, fps, size, LoopMode::Wrap),
+        ] {
+            let share = labels[1..].iter().filter(|c| **c).count() as f64 / (frames - 1) as f64;
+            assert!((share - 0.6).abs() < 0.09, "size {size}, {fps} Hz: {share}");
+            assert_eq!(labels[0], labels[frames - 1]);
+        }
+    }
+}
+
+#[test]
+fn short_touches_and_gaps_vanish() {
+    let fps = 100.0;
+    let mut points = vec![vec![Vector3::new(0.0, 0.0, 0.0)]; 100];
+    points[40..44].fill(vec![Vector3::new(0.0, 0.0, 0.5)]);
+    assert!(
+        contact::detect_above(&points, 0.0, fps, 1.0, LoopMode::Clamp)
+            .iter()
+            .all(|c| *c)
+    );
+    let mut points = vec![vec![Vector3::new(0.0, 0.0, 0.5)]; 100];
+    points[40..44].fill(vec![Vector3::zeros()]);
+    assert!(
+        contact::detect_above(&points, 0.0, fps, 1.0, LoopMode::Clamp)
+            .iter()
+            .all(|c| !c)
+    );
+}
+
+#[test]
+fn files_come_back_as_they_were() {
+    let s = humanoid();
+    let qvel: Vec<f64> = (0..s.nv).map(|i| (i as f64).sin()).collect();
+    let motion = Motion::from_poses(&s, draft(&s, steady(&s, &qvel, 20, 60.0), 60.0));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("test.motion");
+    motion.save(&path).expect("it can be written");
+    let back = Motion::load(&path).expect("it can be read");
+    back.check_skeleton(&s).expect("it fits its skeleton");
+    let close = |a: &[Isometry3<f64>], b: &[Isometry3<f64>]| {
+        a.iter()
+            .zip(b)
+            .all(|(a, b)| (a.to_homogeneous() - b.to_homogeneous()).norm() < 1e-12)
+    };
+    assert!(
+        motion
+            .bodies
+            .iter()
+            .zip(&back.bodies)
+            .all(|(a, b)| close(a, b))
+    );
+    let exact = Motion {
+        bodies: motion.bodies.clone(),
+        ..back
+    };
+    assert_eq!(exact, motion);
+}
+
+#[test]
+fn damaged_files_never_panic() {
+    let s = humanoid();
+    let motion = Motion::from_poses(&s, draft(&s, steady(&s, &vec![0.1; s.nv], 3, 60.0), 60.0));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("test.motion");
+    motion.save(&path).expect("it can be written");
+    let bytes = std::fs::read(&path).expect("it was written");
+    let mut state = 7_u64;
+    let mut below = |count: usize| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 33) as usize % count
+    };
+    for _ in 0..2000 {
+        let mut damaged = bytes.clone();
+        // Mostly the header: that is where lengths and shapes are.
+        for _ in 0..=below(3) {
+            let at = if below(4) == 0 {
+                below(damaged.len())
+            } else {
+                below(2400)
+            };
+            damaged[at] = b"0129\"[],{}x\x00\xff"[below(13)];
+        }
+        if below(5) == 0 {
+            damaged.truncate(below(bytes.len()));
+        }
+        std::fs::write(&path, &damaged).expect("it can be written");
+        if let Ok(read) = Motion::load(&path) {
+            assert!(read.qpos.len() == read.bodies.len());
+        }
+    }
+}
