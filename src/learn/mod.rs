@@ -13,11 +13,13 @@ mod gae;
 mod kernels;
 mod network;
 mod normalizer;
+mod performer;
 mod policy;
 mod ppo;
 mod random;
 mod rollout;
 mod stats;
+mod run;
 mod surrogate;
 mod trainer;
 #[cfg(test)]
@@ -33,13 +35,18 @@ pub use gae::{StepEnd, Trajectories, advantages};
 pub use kernels::Scalar;
 pub use network::{Activation, Mlp, Workspace};
 pub use normalizer::{FrozenNormalizer, Normalizer};
+pub use performer::{Memory, Performer};
 pub use policy::{ActWorkspace, Acted, NamedTensor, Policy, PolicySpec, fill_normal};
 pub use ppo::{Learner, LearnerState};
 pub use random::RngState;
+pub use run::{Run, RunError};
 pub use stats::UpdateStats;
 pub use surrogate::LossTerms;
 pub use trainer::{Metrics, Plan, TrainError, Trainer, TrainerState};
 pub use value_scale::ValueScale;
+
+/// Normalised observations are clipped to ± this.
+const OBSERVATION_LIMIT: f64 = 10.0;
 
 /// Why learning can't go on.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

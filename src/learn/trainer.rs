@@ -2,6 +2,7 @@
 
 use super::rollout::{Actor, Buffer, Group, stream};
 use super::{
+    OBSERVATION_LIMIT,
     Batch, Config, LearnError, Learner, LearnerState, Normalizer, PolicySpec, Trajectories, UpdateStats,
     advantages,
 };
@@ -118,8 +119,6 @@ struct Samples {
     returns: Vec<f32>,
 }
 
-const OBSERVATION_LIMIT: f64 = 10.0;
-
 impl Trainer {
     /// # Errors
     /// A plan or a motion that can't be trained.
@@ -172,6 +171,11 @@ impl Trainer {
 
     pub fn normalizer(&self) -> &Normalizer {
         &self.normalizer
+    }
+
+    /// Iterations done.
+    pub fn iteration(&self) -> u64 {
+        self.iteration
     }
 
     /// Control steps taken by all environments together.

@@ -1,6 +1,6 @@
 //! Which body stands for which humanoid slot: from the JSON beside the MJCF, or by the bodies' names.
 
-use super::Body;
+use super::{Body, Skeleton};
 use crate::humanoid::Slot;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -92,4 +92,16 @@ fn limb(part: &str) -> Option<(Slot, Slot)> {
         "hand" | "wrist" => (Slot::LeftHand, Slot::RightHand),
         _ => return None,
     })
+}
+
+impl Skeleton {
+    /// The humanoid slots as the JSON text that [`Skeleton::from_mjcf`] reads.
+    pub fn slots_json(&self) -> String {
+        let slots: BTreeMap<Slot, &str> = self
+            .slots
+            .iter()
+            .map(|(slot, body)| (*slot, self.bodies[*body].name.as_str()))
+            .collect();
+        serde_json::json!({ "slots": slots }).to_string()
+    }
 }

@@ -1,0 +1,102 @@
+//! One deterministic episode, kept frame by frame for metrics and replay.
+
+use crate::learn::{LearnError, Memory, Performer};
+use crate::sim::LinkState;
+use crate::task::{Dynamics, Failure, Outcome, Sample, Setting, Stage, Terminations, Terms};
+use nalgebra::{Point3, Vector3};
+
+/// Mean distance of the bodies from their reference beyond which an episode has failed, metres.
+const LOST_M: f32 = 0.5;
+
+/// Agent and reference at the end of one control step.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Time in the reference, seconds.
+    pub time: f64,
+    pub agent: Vec<LinkState>,
+    pub reference: Sample,
+    pub dynamics: Dynamics,
+    /// Per contact link of the motion: whether the agent presses on the ground with it.
+    pub contacts: Vec<bool>,
+    pub terms: Terms,
+    /// In (0, 1].
+    pub reward: f32,
+}
+
+/// An episode.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Start as a share of the motion.
+    pub start: f64,
+    pub control_hz: f64,
+    pub frames: Vec<Frame>,
+    /// Steps of an episode without failure.
+    pub possible: usize,
+    pub failure: Option<Failure>,
+    /// Links that the motion puts on the ground, in the order of [`Frame::contacts`].
+    pub contact_links: Vec<usize>,
+}
+
+/// Plays reference number `which` from the share `start` of its length, for `seconds` or to its end.
+///
+/// An episode fails by a fall, or when the bodies are 0.5 m from their reference in the mean, whatever rules the policy
+/// was trained under.
+///
+/// # Errors
+/// Observations that stopped being finite.
+pub fn play(performer: &Performer, which: usize, start: f64, seconds: f64) -> Result<Trace, LearnError> {
+    let rules = Terminations { distance: f32::INFINITY, fall: true, reward: None };
+    let setting = Setting { terminations: rules, episode_s: seconds, ..*performer.setting() };
+    let reference = &performer.references()[which];
+    let mut env = performer.environment(which, &setting);
+    env.reset(start * env.last_start());
+    let mut trace = Trace {
+        start,
+        control_hz: setting.physics.control_hz,
+        frames: Vec::new(),
+        possible: env.possible_steps() as usize,
+        failure: None,
+        contact_links: reference.contact_links.clone(),
+    };
+    let mut memory = Memory::default();
+    loop {
+        let action = performer.act(&env, &mut memory)?;
+        let step = env.step(action);
+        let mut sample = reference.blank();
+        reference.sample(env.time(), &mut sample);
+        if let Outcome::Failed(failure) = step.outcome {
+            trace.failure = Some(failure);
+            return Ok(trace);
+        }
+        if mean_distance(performer.stage(), env.states(), &sample.links) > LOST_M {
+            trace.failure = Some(Failure::Distance);
+            return Ok(trace);
+        }
+        trace.frames.push(Frame {
+            time: env.time(),
+            agent: env.states().to_vec(),
+            reference: sample,
+            dynamics: *env.dynamics(),
+            contacts: trace.contact_links.iter().map(|&link| env.contacts()[link]).collect(),
+            terms: step.terms,
+            reward: step.reward,
+        });
+        if step.outcome != Outcome::Running {
+            return Ok(trace);
+        }
+    }
+}
+
+/// World positions of all the skeleton's bodies, welded ones included, metres.
+pub(super) fn positions<'a>(stage: &'a Stage, links: &'a [LinkState]) -> impl Iterator<Item = Vector3<f32>> + 'a {
+    stage
+        .character
+        .bodies
+        .iter()
+        .map(|(link, offset)| (links[*link].pose * Point3::from(offset.translation.vector.cast::<f32>())).coords)
+}
+
+fn mean_distance(stage: &Stage, a: &[LinkState], b: &[LinkState]) -> f32 {
+    let sum: f32 = positions(stage, a).zip(positions(stage, b)).map(|(p, q)| (p - q).norm()).sum();
+    sum / stage.character.bodies.len() as f32
+}
