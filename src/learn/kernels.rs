@@ -1,4 +1,4 @@
-//! The loops that take the time: matrix products, and element-wise passes compiled for several vector widths.
+//! The loops that take the time: matrix products, and element-wise passes compiled for two vector widths.
 //!
 //! Element-wise passes are plain Rust compiled once per instruction set and chosen at run time. None of them lets the
 //! compiler contract a multiplication and an addition, and sums run over a fixed number of lanes, so every instruction
@@ -136,7 +136,7 @@ pub(crate) fn multiply<T: Scalar>(
     }
 }
 
-/// Compiles a function for AVX-512, AVX2 and the baseline, and picks one at run time.
+/// Compiles a function for AVX2 and for the baseline, and picks one at run time. (AVX-512 gained nothing measurable.)
 macro_rules! vectorised {
     ($(#[$doc:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
         $(#[$doc])*
@@ -145,24 +145,12 @@ macro_rules! vectorised {
             fn body<T: Scalar>($($argument: $type),*) $(-> $out)? $body
             #[cfg(target_arch = "x86_64")]
             {
-                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-                fn avx512<T: Scalar>($($argument: $type),*) $(-> $out)? {
-                    body($($argument),*)
-                }
                 #[target_feature(enable = "avx2")]
                 fn avx2<T: Scalar>($($argument: $type),*) $(-> $out)? {
                     body($($argument),*)
                 }
-                if is_x86_feature_detected!("avx512f")
-                    && is_x86_feature_detected!("avx512vl")
-                    && is_x86_feature_detected!("avx512dq")
-                    && is_x86_feature_detected!("avx512bw")
-                {
-                    // SAFETY: the processor has every feature that the function is compiled for.
-                    return unsafe { avx512($($argument),*) };
-                }
                 if is_x86_feature_detected!("avx2") {
-                    // SAFETY: as above.
+                    // SAFETY: the processor has the feature that the function is compiled for.
                     return unsafe { avx2($($argument),*) };
                 }
             }

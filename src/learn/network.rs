@@ -44,7 +44,7 @@ pub struct Workspace<T> {
 }
 
 impl Mlp {
-    /// `sizes` is inputs, hidden widths, outputs.
+    /// `hidden` lists the widths of the layers between inputs and outputs.
     pub fn new(inputs: usize, hidden: &[usize], outputs: usize, activation: Activation) -> Self {
         let mut layers = Vec::with_capacity(hidden.len() + 1);
         let (mut from, mut start) = (inputs, 0);
@@ -115,6 +115,9 @@ impl Mlp {
 
     /// Adds to `gradient` the gradient by the parameters, given the gradient by the outputs `[batch, outputs]`.
     /// Must follow [`Mlp::forward`] on the same parameters, input and workspace.
+    ///
+    /// # Panics
+    /// When a slice has another length than the shape says.
     pub fn backward<T: Scalar>(
         &self,
         parameters: &[T],
