@@ -64,65 +64,94 @@ fn learner<T: Scalar>(rng: &mut ChaCha8Rng) -> Result<Learner<T>, Box<dyn Error>
     Ok(learner)
 }
 
+/// A batch and what its making needs to be checked.
+struct Experience<T> {
+    observations: Vec<T>,
+    noise: Vec<T>,
+    actions: Vec<T>,
+    /// Of the actions, under the policy that acted.
+    log_probs_acted: Vec<T>,
+    log_probs: Vec<T>,
+    values: Vec<T>,
+    advantages: Vec<T>,
+    returns: Vec<T>,
+}
+
+impl<T: Scalar> Experience<T> {
+    fn new(learner: &Learner<T>, rng: &mut ChaCha8Rng) -> Result<Self, Box<dyn Error>> {
+        let policy = learner.policy();
+        let observations = random::<T>(SAMPLES * policy.spec().observation, rng);
+        let noise = random::<T>(SAMPLES * policy.spec().action, rng);
+        let mut workspace = ActWorkspace::default();
+        let acted = policy.act(learner.parameters(), &observations, &noise, &mut workspace)?;
+        // As if an older policy had acted: ratios fall on both sides of the clipping range.
+        let shift = random::<T>(SAMPLES, rng);
+        let log_probs = acted.log_probs.iter().zip(shift);
+        let log_probs = log_probs.map(|(&l, s)| l + T::from_f64(0.2) * s).collect();
+        let advantages = random(SAMPLES, rng);
+        let returns = random::<T>(SAMPLES, rng).into_iter();
+        let returns = returns.map(|r| T::from_f64(7.0) + T::from_f64(3.0) * r);
+        Ok(Self {
+            actions: acted.actions.to_vec(),
+            log_probs_acted: acted.log_probs.to_vec(),
+            log_probs,
+            values: acted.values.to_vec(),
+            advantages,
+            returns: returns.collect(),
+            observations,
+            noise,
+        })
+    }
+
+    fn batch(&self) -> Batch<'_, T> {
+        Batch {
+            observations: &self.observations,
+            actions: &self.actions,
+            log_probs: &self.log_probs,
+            values: &self.values,
+            advantages: &self.advantages,
+            returns: &self.returns,
+        }
+    }
+
+    fn push(&self, tensors: &mut Tensors) {
+        push(tensors, "observations", &self.observations);
+        push(tensors, "noise", &self.noise);
+        push(tensors, "actions", &self.actions);
+        push(tensors, "log_probs_acted", &self.log_probs_acted);
+        push(tensors, "log_probs", &self.log_probs);
+        push(tensors, "values", &self.values);
+        push(tensors, "advantages", &self.advantages);
+        push(tensors, "returns", &self.returns);
+    }
+}
+
 fn write<T: Scalar>(path: &Path) -> Result<(), Box<dyn Error>> {
     let mut rng = ChaCha8Rng::seed_from_u64(2024);
     let mut learner = learner::<T>(&mut rng)?;
-    let spec = learner.policy().spec().clone();
-    let observations = random::<T>(SAMPLES * spec.observation, &mut rng);
-    let noise = random::<T>(SAMPLES * spec.action, &mut rng);
-    let mut workspace = ActWorkspace::default();
-    let acted =
-        learner
-            .policy()
-            .act(learner.parameters(), &observations, &noise, &mut workspace)?;
-    let (actions, values) = (acted.actions.to_vec(), acted.values.to_vec());
-    // As if the actions had come from an older policy: ratios fall on both sides of the clipping range.
-    let shift = random::<T>(SAMPLES, &mut rng);
-    let old = acted.log_probs.iter().zip(shift);
-    let log_probs: Vec<T> = old.map(|(&l, s)| l + T::from_f64(0.2) * s).collect();
-    let advantages = random::<T>(SAMPLES, &mut rng);
-    let scaled = random::<T>(SAMPLES, &mut rng).into_iter();
-    let returns: Vec<T> = scaled
-        .map(|r| T::from_f64(7.0) + T::from_f64(3.0) * r)
-        .collect();
-    let batch = Batch {
-        observations: &observations,
-        actions: &actions,
-        log_probs: &log_probs,
-        values: &values,
-        advantages: &advantages,
-        returns: &returns,
-    };
-
+    let experience = Experience::new(&learner, &mut rng)?;
     let mut tensors = Tensors::new();
-    let before = learner.parameters().to_vec();
-    push(&mut tensors, "parameters_before", &before);
-    push(&mut tensors, "observations", &observations);
-    push(&mut tensors, "noise", &noise);
-    push(&mut tensors, "actions", &actions);
-    push(&mut tensors, "log_probs_acted", acted.log_probs);
-    push(&mut tensors, "log_probs", &log_probs);
-    push(&mut tensors, "values", &values);
-    push(&mut tensors, "advantages", &advantages);
-    push(&mut tensors, "returns", &returns);
+    experience.push(&mut tensors);
+    push(&mut tensors, "parameters_before", learner.parameters());
     let first: Vec<u32> = (0..150).collect();
-    let (terms, gradient) = learner.gradient(&batch, &first)?;
-    let terms = [
-        terms.policy,
-        terms.value,
-        terms.action_bound,
-        terms.approx_kl,
-        terms.clip_fraction,
-    ];
-    push(&mut tensors, "gradient_terms", &terms);
+    let (terms, gradient) = learner.gradient(&experience.batch(), &first)?;
+    let losses = [terms.policy, terms.value, terms.action_bound];
+    push(&mut tensors, "losses", &losses);
+    push(
+        &mut tensors,
+        "divergence",
+        &[terms.approx_kl, terms.clip_fraction],
+    );
     push(&mut tensors, "gradient", gradient);
+    // The update draws the same orders from the same state of the stream.
     let mut peek = rng.clone();
-    let order: Vec<f64> = (0..config().epochs)
-        .flat_map(|_| shuffled(SAMPLES, &mut peek))
-        .map(f64::from)
-        .collect();
-    push(&mut tensors, "order", &order);
-    let stats = learner.update(&batch, &mut rng)?;
+    let orders = (0..config().epochs).flat_map(|_| shuffled(SAMPLES, &mut peek));
+    push(
+        &mut tensors,
+        "order",
+        &orders.map(f64::from).collect::<Vec<_>>(),
+    );
+    let stats = learner.update(&experience.batch(), &mut rng)?;
     push(&mut tensors, "parameters_after", learner.parameters());
     save(path, &tensors, &learner, serde_json::to_value(stats)?)
 }

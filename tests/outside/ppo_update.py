@@ -168,7 +168,8 @@ def compare(path):
     first = {name: values[:150] for name, values in data.items()}
     first["targets"] = targets(tree, first["returns"])
     gradient, values = jax.grad(loss, has_aux=True)(tree, first, config)
-    figures["loss terms"] = difference(tensors["gradient_terms"], values)
+    figures["losses"] = difference(tensors["losses"], values[:3])
+    figures["divergence"] = difference(tensors["divergence"], values[3:])
     figures["gradient"] = difference(tensors["gradient"], flatten(learned(gradient), layout))
 
     tree = rescale(tree, data["returns"].mean(), data["returns"].std())
