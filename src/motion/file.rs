@@ -152,31 +152,10 @@ impl Motion {
                 at.ok_or_else(|| format!("contact body `{name}` is not one of its bodies"))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let rows = |name: &str, width: Option<usize>| table.rows_of(name, frames, width);
-        let vectors = |name: &str| -> Result<Vec<Vector3<f64>>, String> {
-            let rows = rows(name, Some(3))?;
-            Ok(rows.iter().map(|r| Vector3::from_column_slice(r)).collect())
-        };
-        let wrenches = rows("root_wrench_residual", Some(6))?;
-        let contact = rows("contact", Some(contact_bodies.len()))?;
-        let tracks = Tracks {
-            phase: rows("phase", Some(1))?.concat(),
-            com: vectors("com")?,
-            com_velocity: vectors("com_velocity")?,
-            linear_momentum: vectors("linear_momentum")?,
-            angular_momentum: vectors("angular_momentum")?,
-            contact: contact
-                .iter()
-                .map(|row| row.iter().map(|&c| c != 0.0).collect())
-                .collect(),
-            root_wrench_residual: wrenches
-                .iter()
-                .map(|r| Vector6::from_column_slice(r))
-                .collect(),
-        };
+        let rows = |name: &str, width: usize| table.rows_of(name, frames, Some(width));
         let poses = poses(
-            &rows("body_position", Some(3 * bodies))?,
-            &rows("body_rotation", Some(4 * bodies))?,
+            &rows("body_position", 3 * bodies)?,
+            &rows("body_rotation", 4 * bodies)?,
         );
         Ok(Self {
             name: header.name,
@@ -189,11 +168,11 @@ impl Motion {
             skeleton_name: header.skeleton.name,
             skeleton_sha256: header.skeleton.sha256,
             body_names: header.bodies,
+            tracks: table.tracks(frames, contact_bodies.len())?,
             contact_bodies,
-            qvel: rows("qvel", None)?,
+            qvel: table.rows_of("qvel", frames, None)?,
             qpos,
             bodies: poses,
-            tracks,
             report: header.report,
         })
     }
@@ -335,6 +314,29 @@ impl Table<'_> {
             ));
         }
         Ok(rows)
+    }
+
+    fn tracks(&self, frames: usize, contact_bodies: usize) -> Result<Tracks, String> {
+        let rows = |name: &str, width: usize| self.rows_of(name, frames, Some(width));
+        let vectors = |name: &str| -> Result<Vec<Vector3<f64>>, String> {
+            let rows = rows(name, 3)?;
+            Ok(rows.iter().map(|r| Vector3::from_column_slice(r)).collect())
+        };
+        let wrenches = rows("root_wrench_residual", 6)?;
+        let contact = rows("contact", contact_bodies)?;
+        let stands = |row: &Vec<f64>| row.iter().map(|&c| c != 0.0).collect();
+        Ok(Tracks {
+            phase: rows("phase", 1)?.concat(),
+            com: vectors("com")?,
+            com_velocity: vectors("com_velocity")?,
+            linear_momentum: vectors("linear_momentum")?,
+            angular_momentum: vectors("angular_momentum")?,
+            contact: contact.iter().map(stands).collect(),
+            root_wrench_residual: wrenches
+                .iter()
+                .map(|r| Vector6::from_column_slice(r))
+                .collect(),
+        })
     }
 
     /// `name` with all axes but the first as one, of size `width` if given.

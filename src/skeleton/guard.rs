@@ -40,8 +40,7 @@ pub(super) fn check(xml: &str) -> Result<(), String> {
 /// Length of the markup that `text` begins with.
 fn markup_end(text: &str) -> Option<usize> {
     for (open, close) in [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")] {
-        if text.starts_with(open) {
-            let inner = &text[open.len()..];
+        if let Some(inner) = text.strip_prefix(open) {
             return inner.find(close).map(|at| open.len() + at + close.len());
         }
     }

@@ -156,32 +156,10 @@ impl<'a> Builder<'a> {
             let free = joints.iter().any(|j| j.type_ == JointType::Free);
             let name = entry.body.name.clone();
             let name = name.unwrap_or_else(|| format!("body{id}"));
-            let place = || format!("body `{name}`");
-            match (parent, free) {
-                (None, false) if joints.is_empty() => continue,
-                (None, false) => {
-                    return Err(self.error(
-                        place(),
-                        "it moves, but no body above it has a free joint; add <freejoint/> to the character's top body, and take scenery with joints away",
-                    ));
-                }
-                (None, true) if !self.bodies.is_empty() => {
-                    return Err(self.error(
-                        place(),
-                        "it is a second moving tree; keep the character alone in the file",
-                    ));
-                }
-                (Some(_), true) => {
-                    return Err(self.error(place(), "only the top body can have a free joint"));
-                }
-                (None, true) if joints.len() > 1 => {
-                    return Err(self.error(place(), "a free joint has to be its body's only joint"));
-                }
-                _ => {}
+            if parent.is_none() && joints.is_empty() {
+                continue;
             }
-            if self.bodies.iter().any(|b| b.name == name) {
-                return Err(self.error(place(), "the name is used twice"));
-            }
+            self.check_place(&name, parent.is_some(), free, joints.len())?;
             let body = self.body(name, parent, &entry.body)?;
             self.index[id] = Some(self.bodies.len());
             self.bodies.push(body);
@@ -193,6 +171,30 @@ impl<'a> Builder<'a> {
             ));
         }
         Ok(())
+    }
+
+    /// That a body fits into the one tree on a free root.
+    fn check_place(
+        &self,
+        name: &str,
+        has_parent: bool,
+        free: bool,
+        joints: usize,
+    ) -> Result<(), SkeletonError> {
+        let problem = match (has_parent, free) {
+            (false, false) => {
+                "it moves, but no body above it has a free joint; add <freejoint/> to the \
+                 character's top body, and take scenery with joints away"
+            }
+            (false, true) if !self.bodies.is_empty() => {
+                "it is a second moving tree; keep the character alone in the file"
+            }
+            (false, true) if joints > 1 => "a free joint has to be its body's only joint",
+            (true, true) => "only the top body can have a free joint",
+            _ if self.bodies.iter().any(|b| b.name == name) => "the name is used twice",
+            _ => return Ok(()),
+        };
+        Err(self.error(format!("body `{name}`"), problem))
     }
 
     fn body(

@@ -80,12 +80,14 @@ fn limits_bend_the_way_people_do() {
     let limits = |slot: Slot, axis: usize| s.bodies[s.slots[&slot]].joints[0].limits[axis];
     let (x, y) = (Vector3::x(), Vector3::y());
 
-    assert_eq!(limits(Slot::LeftLowerLeg, 0), [0.0, 3.14]);
+    let [straight, bent] = limits(Slot::LeftLowerLeg, 0);
+    assert!(straight == 0.0 && bent > 3.0);
     assert!(
         at(Slot::LeftLowerLeg, Slot::LeftFoot, y, 1.5).x < -0.9,
         "knees bend backwards"
     );
-    assert_eq!(limits(Slot::RightLowerArm, 0), [-3.14, 0.0]);
+    let [bent, straight] = limits(Slot::RightLowerArm, 0);
+    assert!(straight == 0.0 && bent < -3.0);
     assert!(
         at(Slot::RightLowerArm, Slot::RightHand, y, -1.5).x > 0.9,
         "elbows bend forwards"
