@@ -4,6 +4,7 @@ use super::coordinates::{store, store_quaternion};
 use super::{JointKind, Shape, Skeleton, Twist};
 use crate::humanoid::Slot;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
+use std::f64::consts::PI;
 
 impl Skeleton {
     /// kg.
@@ -74,18 +75,32 @@ impl Skeleton {
         qpos
     }
 
-    /// Height of the hip joint above the ground in the rest pose, metres; without leg slots, of the root.
+    /// Distance from the hip joint to the sole along the leg in the rest pose, metres: the hip's height above the
+    /// ground for a character whose rest pose stands. Without leg and foot slots it is the root's height.
     pub fn leg_length(&self) -> f64 {
-        let hip = [Slot::LeftUpperLeg, Slot::RightUpperLeg]
-            .iter()
-            .find_map(|slot| self.slots.get(slot).copied())
-            .unwrap_or(0);
-        let anchor = self.bodies[hip]
-            .joints
-            .first()
-            .map_or_else(Vector3::zeros, |j| j.anchor);
         let poses = self.forward(&self.rest_qpos());
-        (poses[hip] * Point3::from(anchor)).z
+        let height = poses[0].translation.z;
+        let slot = |slot: Slot| self.slots.get(&slot).copied();
+        let sides = [
+            (Slot::LeftUpperLeg, Slot::LeftFoot),
+            (Slot::RightUpperLeg, Slot::RightFoot),
+        ];
+        let leg = sides
+            .into_iter()
+            .find_map(|(hip, foot)| Some((slot(hip)?, slot(foot)?)));
+        leg.map_or(height, |(hip, foot)| self.length_along(&poses, hip, foot))
+    }
+
+    /// Height of `upper`'s first joint over the lowest point of `lower`, with the line between them upright.
+    fn length_along(&self, poses: &[Isometry3<f64>], upper: usize, lower: usize) -> f64 {
+        let joint = self.bodies[upper].joints.first();
+        let anchor = joint.map_or_else(Vector3::zeros, |j| j.anchor);
+        let top = poses[upper] * Point3::from(anchor);
+        let down = poses[lower].translation.vector - top.coords;
+        let upright = UnitQuaternion::rotation_between(&down, &-Vector3::z())
+            .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * PI));
+        let turned: Vec<Isometry3<f64>> = poses.iter().map(|pose| upright * pose).collect();
+        (upright * top).z - self.lowest_point_of(&turned, &[lower])
     }
 
     /// Height of the lowest point of all shapes, metres; of body origins if there are no shapes.

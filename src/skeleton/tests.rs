@@ -65,6 +65,19 @@ fn the_built_in_humanoid_has_the_published_sizes() {
     assert!(s.lowest_point(&s.forward(&s.rest_qpos())).abs() < 1e-12);
 }
 
+/// A character lying in its file has the same legs as one that stands.
+#[test]
+fn leg_length_does_not_depend_on_how_the_file_lies() {
+    let standing = humanoid();
+    let turned = standing.mjcf.replace(
+        r#"<body name="pelvis" "#,
+        r#"<body name="pelvis" quat="1 0 1 0" "#,
+    );
+    let lying = Skeleton::from_mjcf("lying", &turned, None).expect("valid MJCF");
+    assert!(lying.bodies[0].rest.rotation.angle() > 1.5);
+    assert!((lying.leg_length() - standing.leg_length()).abs() < 1e-9);
+}
+
 /// Where a quarter turn at one end of its limits puts the end of the limb: legs and arms move as people's do.
 #[test]
 fn limits_bend_the_way_people_do() {
