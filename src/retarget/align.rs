@@ -1,0 +1,145 @@
+//! How the source's bones correspond to the skeleton's: constant turns found from bone directions at rest.
+
+use super::RetargetError;
+use crate::clip::Clip;
+use crate::humanoid::{HumanoidMap, Slot};
+use crate::skeleton::Skeleton;
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+
+/// A source joint and the skeleton's body that follows it.
+#[derive(Clone, Debug)]
+pub(super) struct Bind {
+    pub slot: Slot,
+    pub joint: usize,
+    pub body: usize,
+    /// Source joint from body: the body's goal is the joint's world rotation times this.
+    pub joint_from_body: UnitQuaternion<f64>,
+}
+
+pub(super) struct Alignment {
+    pub binds: Vec<Bind>,
+    /// Skeleton's leg length / source's leg length.
+    pub scale: f64,
+}
+
+/// Where the slots are in a rest pose.
+struct Figure {
+    at: BTreeMap<Slot, Vector3<f64>>,
+}
+
+/// Matches the rest poses of clip and skeleton, whatever these are (arms out, down, in between).
+pub(super) fn align(
+    clip: &Clip,
+    map: &HumanoidMap,
+    skeleton: &Skeleton,
+) -> Result<Alignment, RetargetError> {
+    let source_rest = clip.rest_world();
+    let body_rest = skeleton.forward(&skeleton.rest_qpos());
+    let source = Figure::new(map.matches.iter().map(|(s, m)| (*s, m.joint)), &source_rest);
+    let target = Figure::new(skeleton.slots.iter().map(|(s, b)| (*s, *b)), &body_rest);
+    let scale = target.leg_length().ok_or(RetargetError::NoLegs)?
+        / source.leg_length().ok_or(RetargetError::NoSourceLegs)?;
+    let mut binds = Vec::new();
+    for (&slot, &body) in &skeleton.slots {
+        let (Some(joint), Some(from)) = (map.joint(slot), target.frame(slot)) else {
+            continue;
+        };
+        let Some(to) = source.frame(slot) else {
+            continue;
+        };
+        let body_at_source_rest = to * from.inverse() * body_rest[body].rotation;
+        let joint_from_body = source_rest[joint].rotation.inverse() * body_at_source_rest;
+        binds.push(Bind { slot, joint, body, joint_from_body });
+    }
+    Ok(Alignment { binds, scale })
+}
+
+impl Figure {
+    fn new(slots: impl Iterator<Item = (Slot, usize)>, rest: &[Isometry3<f64>]) -> Figure {
+        Figure {
+            at: slots.map(|(slot, i)| (slot, rest[i].translation.vector)).collect(),
+        }
+    }
+
+    fn span(&self, from: Slot, to: Slot) -> Option<Vector3<f64>> {
+        Some(self.at.get(&to)? - self.at.get(&from)?)
+    }
+
+    /// Hip to ankle along the bones, mean of both sides; `None` if there are no legs or they have no length.
+    fn leg_length(&self) -> Option<f64> {
+        let leg = |upper, lower, foot| {
+            Some(self.span(upper, lower)?.norm() + self.span(lower, foot)?.norm())
+        };
+        let left = leg(Slot::LeftUpperLeg, Slot::LeftLowerLeg, Slot::LeftFoot)?;
+        let right = leg(Slot::RightUpperLeg, Slot::RightLowerLeg, Slot::RightFoot)?;
+        let mean = (left + right) / 2.0;
+        (mean.is_finite() && mean > 1e-6).then_some(mean)
+    }
+
+    /// Horizontal unit vector to the figure's left, from hips and shoulders.
+    fn left(&self) -> Option<Vector3<f64>> {
+        let hips = self.span(Slot::RightUpperLeg, Slot::LeftUpperLeg)?;
+        let arms = self.span(Slot::RightUpperArm, Slot::LeftUpperArm).unwrap_or(hips);
+        let across = hips + arms;
+        Vector3::new(across.x, across.y, 0.0).try_normalize(1e-9)
+    }
+
+    /// The orientation that bones give a slot: first axis along the bone (or to the left, for the trunk), second
+    /// axis as near as can be to where the next bone bends (or up).
+    fn frame(&self, slot: Slot) -> Option<UnitQuaternion<f64>> {
+        let (up, left) = (Vector3::z(), self.left()?);
+        let forward = left.cross(&up);
+        let bone = |from: Slot, to: Slot| self.span(from, to)?.try_normalize(1e-9);
+        let (along, second) = match slot {
+            Slot::Hips | Slot::Spine => (bone(Slot::RightUpperLeg, Slot::LeftUpperLeg)?, up),
+            Slot::Chest | Slot::Neck | Slot::Head => {
+                (bone(Slot::RightUpperArm, Slot::LeftUpperArm).unwrap_or(left), up)
+            }
+            Slot::LeftFoot | Slot::LeftToes => (self.toward(Slot::LeftFoot, Slot::LeftToes, forward), up),
+            Slot::RightFoot | Slot::RightToes => {
+                (self.toward(Slot::RightFoot, Slot::RightToes, forward), up)
+            }
+            limb => (self.limb_direction(limb)?, forward),
+        };
+        // An arm held straight forward bends upward.
+        let second = if along.dot(&second).abs() > 0.95 { up } else { second };
+        basis(&along, &second)
+    }
+
+    fn limb_direction(&self, slot: Slot) -> Option<Vector3<f64>> {
+        let (from, to) = match slot {
+            Slot::LeftShoulder => (slot, Slot::LeftUpperArm),
+            Slot::LeftUpperArm => (slot, Slot::LeftLowerArm),
+            Slot::LeftLowerArm | Slot::LeftHand => (Slot::LeftLowerArm, Slot::LeftHand),
+            Slot::RightShoulder => (slot, Slot::RightUpperArm),
+            Slot::RightUpperArm => (slot, Slot::RightLowerArm),
+            Slot::RightLowerArm | Slot::RightHand => (Slot::RightLowerArm, Slot::RightHand),
+            Slot::LeftUpperLeg => (slot, Slot::LeftLowerLeg),
+            Slot::LeftLowerLeg => (slot, Slot::LeftFoot),
+            Slot::RightUpperLeg => (slot, Slot::RightLowerLeg),
+            Slot::RightLowerLeg => (slot, Slot::RightFoot),
+            _ => return None,
+        };
+        let upper_arm = match from {
+            Slot::LeftLowerArm => self.span(Slot::LeftUpperArm, from),
+            Slot::RightLowerArm => self.span(Slot::RightUpperArm, from),
+            _ => None,
+        };
+        self.span(from, to).or(upper_arm)?.try_normalize(1e-9)
+    }
+
+    /// Horizontal direction from a foot to its toes; without toes, `forward`.
+    fn toward(&self, foot: Slot, toes: Slot, forward: Vector3<f64>) -> Vector3<f64> {
+        let flat = self.span(foot, toes).map(|v| Vector3::new(v.x, v.y, 0.0));
+        flat.and_then(|v| v.try_normalize(1e-3)).unwrap_or(forward)
+    }
+}
+
+/// Right-handed axes: the first along `along`, the second nearest to `second`.
+fn basis(along: &Vector3<f64>, second: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let x = along.try_normalize(1e-9)?;
+    let z = x.cross(second).try_normalize(1e-9)?;
+    let matrix = Matrix3::from_columns(&[x, z.cross(&x), z]);
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
+}

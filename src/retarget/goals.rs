@@ -1,0 +1,281 @@
+//! What every frame of the skeleton should look like: goals for points and turns, from the source's frames.
+
+use super::align::Alignment;
+use super::model::Model;
+use super::rotation::{exp, heading};
+use crate::clip::Clip;
+use crate::humanoid::{HumanoidMap, Slot};
+use crate::motion::Cycle;
+use crate::skeleton::Skeleton;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+/// A point that follows the source: the origin of a body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Key {
+    pub slot: Slot,
+    pub body: usize,
+    pub weight: f64,
+}
+
+/// A body whose orientation follows the source.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    pub body: usize,
+    /// Metres per radian.
+    pub weight: f64,
+}
+
+#[derive(Clone)]
+pub(super) struct Goals {
+    pub keys: Vec<Key>,
+    pub turns: Vec<Turn>,
+    /// `points[f][k]`, world, metres.
+    pub points: Vec<Vec<Vector3<f64>>>,
+    /// `rotations[f][t]`: world from body.
+    pub rotations: Vec<Vec<UnitQuaternion<f64>>>,
+    /// `guess[f]`: coordinates that take over the source's orientations.
+    pub guess: Vec<Vec<f64>>,
+}
+
+/// Weight of a slot's point, and of its orientation in metres per radian.
+fn weights(slot: Slot) -> (f64, f64) {
+    match slot {
+        Slot::Hips => (1.0, 0.3),
+        Slot::Chest => (0.0, 0.3),
+        Slot::Spine => (0.0, 0.05),
+        Slot::Neck => (0.0, 0.02),
+        Slot::Head => (0.0, 0.15),
+        Slot::LeftUpperArm | Slot::RightUpperArm => (0.5, 0.02),
+        Slot::LeftLowerArm | Slot::RightLowerArm => (0.7, 0.0),
+        Slot::LeftHand | Slot::RightHand => (1.0, 0.02),
+        Slot::LeftUpperLeg | Slot::RightUpperLeg => (0.0, 0.05),
+        Slot::LeftLowerLeg | Slot::RightLowerLeg => (0.5, 0.0),
+        Slot::LeftFoot | Slot::RightFoot => (2.0, 0.2),
+        Slot::LeftToes | Slot::RightToes => (0.0, 0.02),
+        Slot::LeftShoulder | Slot::RightShoulder => (0.0, 0.02),
+    }
+}
+
+const ARMS: [[Slot; 3]; 2] = [
+    [Slot::LeftUpperArm, Slot::LeftLowerArm, Slot::LeftHand],
+    [Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand],
+];
+const LEGS: [[Slot; 3]; 2] = [
+    [Slot::LeftUpperLeg, Slot::LeftLowerLeg, Slot::LeftFoot],
+    [Slot::RightUpperLeg, Slot::RightLowerLeg, Slot::RightFoot],
+];
+
+impl Goals {
+    pub fn new(clip: &Clip, map: &HumanoidMap, alignment: &Alignment, model: &Model) -> Goals {
+        let skeleton = model.skeleton;
+        let slot_body = |slot: Slot| skeleton.slots.get(&slot).copied();
+        let keys: Vec<Key> = Slot::ALL
+            .into_iter()
+            .filter(|slot| weights(*slot).0 > 0.0 && map.joint(*slot).is_some())
+            .filter_map(|slot| Some(Key { slot, body: slot_body(slot)?, weight: weights(slot).0 }))
+            .collect();
+        let turning = |body: usize| !model.chains[body].is_empty();
+        let turns: Vec<(usize, Turn)> = (alignment.binds.iter().enumerate())
+            .map(|(i, bind)| (i, Turn { body: bind.body, weight: weights(bind.slot).1 }))
+            .filter(|(_, turn)| turn.weight > 0.0 && turning(turn.body))
+            .filter(|(_, turn)| !skeleton.bodies[turn.body].joints.is_empty())
+            .collect();
+        let mut goals = Goals {
+            keys,
+            turns: turns.iter().map(|(_, turn)| *turn).collect(),
+            points: Vec::with_capacity(clip.frames.len()),
+            rotations: Vec::with_capacity(clip.frames.len()),
+            guess: Vec::with_capacity(clip.frames.len()),
+        };
+        let builder = Builder::new(map, alignment, skeleton);
+        for f in 0..clip.frames.len() {
+            let source = clip.world(f);
+            let rotations = builder.rotations(&source);
+            let (qpos, bodies) = builder.guess(&source, &rotations, goals.guess.last());
+            goals.points.push(builder.points(&goals.keys, &source, &bodies));
+            let chosen = turns.iter().map(|(i, _)| rotations[*i]);
+            goals.rotations.push(chosen.collect());
+            goals.guess.push(qpos);
+        }
+        goals
+    }
+
+    pub fn frames(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Moves everything.
+    pub fn shift(&mut self, by: &Vector3<f64>) {
+        for f in 0..self.frames() {
+            self.shift_frame(f, by);
+        }
+    }
+
+    pub fn shift_frame(&mut self, f: usize, by: &Vector3<f64>) {
+        self.points[f].iter_mut().for_each(|p| *p += by);
+        for i in 0..3 {
+            self.guess[f][i] += by[i];
+        }
+    }
+
+    /// Position of the root in the guess.
+    pub fn root(&self, f: usize) -> Vector3<f64> {
+        super::model::vector(&self.guess[f], 0)
+    }
+
+    pub fn root_rotation(&self, f: usize) -> UnitQuaternion<f64> {
+        super::model::quaternion(&self.guess[f], 3)
+    }
+
+    /// The turn about Z and shift over the ground that carry the first frame's root to the last frame's.
+    pub fn cycle(&self) -> Cycle {
+        let last = self.frames().saturating_sub(1);
+        let turned = self.root_rotation(last) * self.root_rotation(0).inverse();
+        let mut angle = heading(&turned);
+        if angle.abs() < STRAIGHT {
+            angle = 0.0;
+        }
+        let turn = exp(&(Vector3::z() * angle));
+        let mut translation = self.root(last) - turn * self.root(0);
+        translation.z = 0.0;
+        Cycle { translation, heading: angle }
+    }
+}
+
+/// A cycle that turns less than this goes straight: 1°.
+const STRAIGHT: f64 = 0.0175;
+
+struct Builder<'a> {
+    map: &'a HumanoidMap,
+    alignment: &'a Alignment,
+    skeleton: &'a Skeleton,
+    /// Place in `alignment.binds` of every body's bind.
+    bind_of: Vec<Option<usize>>,
+    /// Middle between the hip joints, in the root's frame.
+    hip_middle: Vector3<f64>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(map: &'a HumanoidMap, alignment: &'a Alignment, skeleton: &'a Skeleton) -> Builder<'a> {
+        let mut bind_of = vec![None; skeleton.bodies.len()];
+        for (i, bind) in alignment.binds.iter().enumerate() {
+            bind_of[bind.body] = Some(i);
+        }
+        let rest = skeleton.forward(&skeleton.rest_qpos());
+        let hip = |slot: Slot| skeleton.slots.get(&slot).map(|b| rest[*b].translation.vector);
+        let middle = match (hip(Slot::LeftUpperLeg), hip(Slot::RightUpperLeg)) {
+            (Some(left), Some(right)) => (left + right) / 2.0,
+            _ => rest[0].translation.vector,
+        };
+        let hip_middle = (rest[0].inverse() * nalgebra::Point3::from(middle)).coords;
+        Builder { map, alignment, skeleton, bind_of, hip_middle }
+    }
+
+    /// Scaled position of a slot's joint.
+    fn source_point(&self, source: &[Isometry3<f64>], slot: Slot) -> Option<Vector3<f64>> {
+        let joint = self.map.joint(slot)?;
+        Some(source[joint].translation.vector * self.alignment.scale)
+    }
+
+    fn rotations(&self, source: &[Isometry3<f64>]) -> Vec<UnitQuaternion<f64>> {
+        let goal = |bind: &super::align::Bind| source[bind.joint].rotation * bind.joint_from_body;
+        self.alignment.binds.iter().map(goal).collect()
+    }
+
+    /// Coordinates and bodies of the pose that has the source's orientations where its joints can turn that way.
+    fn guess(
+        &self,
+        source: &[Isometry3<f64>],
+        rotations: &[UnitQuaternion<f64>],
+        before: Option<&Vec<f64>>,
+    ) -> (Vec<f64>, Vec<Isometry3<f64>>) {
+        let hips = |slot| self.source_point(source, slot);
+        let middle = match (hips(Slot::LeftUpperLeg), hips(Slot::RightUpperLeg)) {
+            (Some(left), Some(right)) => (left + right) / 2.0,
+            _ => hips(Slot::Hips).unwrap_or_else(Vector3::zeros),
+        };
+        let facing = self.goal(0, rotations).unwrap_or_else(UnitQuaternion::identity);
+        let root = Isometry3::from_parts((middle - facing * self.hip_middle).into(), facing);
+        let bodies = &self.skeleton.bodies;
+        let mut world: Vec<UnitQuaternion<f64>> = vec![facing; bodies.len()];
+        for (b, body) in bodies.iter().enumerate().skip(1) {
+            let parent = body.parent.map_or(facing, |p| world[p]);
+            let carried = parent * body.rest.rotation;
+            world[b] = self.goal(b, rotations).unwrap_or(carried);
+        }
+        // Hinges take what they can; what they leave is made up for by the joints below them.
+        let mut qpos = Vec::new();
+        let mut reached = Vec::new();
+        for _ in 0..2 {
+            let local = |b: usize| {
+                let body = &bodies[b];
+                let parent = body.parent.map_or(facing, |p| world[p]);
+                (parent * body.rest.rotation).inverse() * world[b]
+            };
+            let turns: Vec<UnitQuaternion<f64>> = (0..bodies.len()).map(local).collect();
+            qpos = self.skeleton.rotations_to_qpos(&root, &turns, before.map(Vec::as_slice));
+            reached = self.skeleton.forward(&qpos);
+            for b in 1..bodies.len() {
+                let hinged = bodies[b].joints.len() == 1 || bodies[b].joints.is_empty();
+                if hinged {
+                    world[b] = reached[b].rotation;
+                }
+            }
+            for b in 1..bodies.len() {
+                if let Some(goal) = self.goal(b, rotations).filter(|_| self.turns_freely(b)) {
+                    world[b] = goal;
+                }
+            }
+        }
+        (qpos, reached)
+    }
+
+    fn turns_freely(&self, body: usize) -> bool {
+        let joints = &self.skeleton.bodies[body].joints;
+        joints.iter().map(|j| j.kind.nv()).sum::<usize>() >= 3
+    }
+
+    fn goal(&self, body: usize, rotations: &[UnitQuaternion<f64>]) -> Option<UnitQuaternion<f64>> {
+        self.bind_of[body].map(|i| rotations[i])
+    }
+
+    /// Goals of the keys: hips and shoulders where the guess has them, limbs in the source's directions with the
+    /// skeleton's lengths, ankles where the scaled source has them.
+    fn points(
+        &self,
+        keys: &[Key],
+        source: &[Isometry3<f64>],
+        bodies: &[Isometry3<f64>],
+    ) -> Vec<Vector3<f64>> {
+        let at = |body: usize| bodies[body].translation.vector;
+        let mut points: Vec<Vector3<f64>> = keys.iter().map(|key| at(key.body)).collect();
+        let place = |slot: Slot| keys.iter().position(|key| key.slot == slot);
+        for limb in ARMS.iter().chain(&LEGS) {
+            let Some(mut joint) = self.skeleton.slots.get(&limb[0]).map(|b| at(*b)) else {
+                continue;
+            };
+            for pair in limb.windows(2) {
+                let Some(bone) = self.bone(source, pair[0], pair[1]) else {
+                    break;
+                };
+                joint += bone;
+                if let Some(k) = place(pair[1]) {
+                    points[k] = joint;
+                }
+            }
+        }
+        for leg in &LEGS {
+            if let (Some(k), Some(p)) = (place(leg[2]), self.source_point(source, leg[2])) {
+                points[k] = p;
+            }
+        }
+        points
+    }
+
+    /// The skeleton's bone from one slot to the next in the source's direction.
+    fn bone(&self, source: &[Isometry3<f64>], from: Slot, to: Slot) -> Option<Vector3<f64>> {
+        let body = self.skeleton.slots.get(&to).map(|b| &self.skeleton.bodies[*b])?;
+        let direction = self.source_point(source, to)? - self.source_point(source, from)?;
+        Some(direction.try_normalize(1e-9)? * body.rest.translation.vector.norm())
+    }
+}

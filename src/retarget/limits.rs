@@ -1,0 +1,73 @@
+//! Joint limits: how far a coordinate is outside, and the nearest coordinate inside.
+
+use super::model::{put_quaternion, quaternion};
+use super::rotation::{exp, log};
+use crate::skeleton::{Joint, JointKind, Skeleton};
+use nalgebra::Vector3;
+use std::f64::consts::{PI, TAU};
+
+/// Overshoot that counts as rounding, not as a violation, radians.
+const ROUNDING: f64 = 1e-6;
+
+/// Signed distance outside of a range; 0 inside.
+pub(super) fn outside(value: f64, [low, high]: [f64; 2]) -> f64 {
+    if value < low {
+        value - low
+    } else if value > high {
+        value - high
+    } else {
+        0.0
+    }
+}
+
+/// Exponential-map coordinates of a ball joint, and how far outside each is. Of the two rotation vectors that are
+/// the same turn (the short way and the long way round), the one that is less outside.
+pub(super) fn ball(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+    let short = log(&quaternion(qpos, joint.qpos));
+    let excess = |v: &Vector3<f64>| {
+        Vector3::from_fn(|i, _| joint.limits.get(i).map_or(0.0, |range| outside(v[i], *range)))
+    };
+    let beyond = excess(&short);
+    let angle = short.norm();
+    if beyond != Vector3::zeros() && angle > PI / 2.0 {
+        let long = short * (1.0 - TAU / angle);
+        let other = excess(&long);
+        if other.norm() < beyond.norm() {
+            return (long, other);
+        }
+    }
+    (short, beyond)
+}
+
+fn slack(joint: &Joint, qpos: &[f64]) -> f64 {
+    joint.limits.first().map_or(0.0, |range| outside(qpos[joint.qpos], *range))
+}
+
+/// Number of degrees of freedom outside of their range.
+pub(super) fn violations(skeleton: &Skeleton, qpos: &[f64]) -> usize {
+    let joints = skeleton.bodies.iter().flat_map(|body| &body.joints);
+    let count = |joint: &Joint| match joint.kind {
+        JointKind::Free => 0,
+        JointKind::Ball => ball(joint, qpos).1.iter().filter(|x| x.abs() > ROUNDING).count(),
+        JointKind::Hinge(_) | JointKind::Slide(_) => usize::from(slack(joint, qpos).abs() > ROUNDING),
+    };
+    joints.map(count).sum()
+}
+
+/// Moves every coordinate that is outside to the border of its range.
+pub(super) fn clamp(skeleton: &Skeleton, qpos: &mut [f64]) {
+    for joint in skeleton.bodies.iter().flat_map(|body| &body.joints) {
+        match joint.kind {
+            JointKind::Free => {}
+            JointKind::Ball => {
+                let (v, beyond) = ball(joint, qpos);
+                if beyond != Vector3::zeros() {
+                    put_quaternion(qpos, joint.qpos, &exp(&(v - beyond)));
+                }
+            }
+            JointKind::Hinge(_) | JointKind::Slide(_) => {
+                qpos[joint.qpos] -= slack(joint, qpos);
+            }
+        }
+    }
+}
