@@ -2,10 +2,8 @@
 
 use super::align::Alignment;
 use super::model::Model;
-use super::rotation::{exp, heading};
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
-use crate::motion::Cycle;
 use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -126,24 +124,7 @@ impl Goals {
     pub fn root_rotation(&self, f: usize) -> UnitQuaternion<f64> {
         super::model::quaternion(&self.guess[f], 3)
     }
-
-    /// The turn about Z and shift over the ground that carry the first frame's root to the last frame's.
-    pub fn cycle(&self) -> Cycle {
-        let last = self.frames().saturating_sub(1);
-        let turned = self.root_rotation(last) * self.root_rotation(0).inverse();
-        let mut angle = heading(&turned);
-        if angle.abs() < STRAIGHT {
-            angle = 0.0;
-        }
-        let turn = exp(&(Vector3::z() * angle));
-        let mut translation = self.root(last) - turn * self.root(0);
-        translation.z = 0.0;
-        Cycle { translation, heading: angle }
-    }
 }
-
-/// A cycle that turns less than this goes straight: 1°.
-const STRAIGHT: f64 = 0.0175;
 
 struct Builder<'a> {
     map: &'a HumanoidMap,

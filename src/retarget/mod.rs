@@ -12,6 +12,7 @@ mod limits;
 mod model;
 mod report;
 mod rotation;
+mod seam;
 mod solve;
 mod stance;
 
@@ -86,7 +87,11 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
     let root = goals.root(0);
     goals.shift(&Vector3::new(-root.x, -root.y, -ground));
     let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
-    let cycle = wraps.then(|| goals.cycle());
+    let cycle = wraps.then(|| seam::cycle(&goals, &model));
+    let faithful = goals.clone();
+    if let Some(cycle) = &cycle {
+        seam::close(&mut goals, cycle, &model, clip.fps);
+    }
     let anchors = stance::anchors(&model, &goals, clip.fps, leg, cycle.as_ref());
     let problem = Problem { model: &model, goals: &goals, anchors: &anchors, fps: clip.fps };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
@@ -104,7 +109,7 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
             report: serde_json::Value::Null,
         },
     );
-    let report = report::report(&model, &goals, &motion, report::mapped(clip, &map), clip.problems.clone());
+    let report = report::report(&model, &faithful, &motion, report::mapped(clip, &map), clip.problems.clone());
     motion.report = serde_json::to_value(&report).unwrap_or_default();
     Ok(Retargeted { motion, report, seconds: start.elapsed().as_secs_f64(), iterations })
 }

@@ -14,15 +14,30 @@ fn clip(file: &str, take: Option<&str>) -> Option<Clip> {
 #[test]
 fn explore() {
     let skeleton = Skeleton::load("humanoid").unwrap();
-    for file in ["walk", "kick", "spinkick", "backflip", "run", "cartwheel", "getup_facedown", "crawl", "jump"] {
-        let Some(clip) = clip(&format!("deepmimic/humanoid3d_{file}.txt"), None) else { return };
-        let done = retarget(&clip, &skeleton, &Options::default()).unwrap();
+    let names = std::env::var("CLIPS").unwrap_or("deepmimic/humanoid3d_walk.txt".into());
+    for name in names.split(',') {
+        let (file, take) = name.split_once('@').map_or((name, None), |(f, t)| (f, Some(t)));
+        let Some(clip) = clip(file, take) else { return };
+        let done = match retarget(&clip, &skeleton, &Options::default()) {
+            Ok(done) => done,
+            Err(e) => { println!("{name}: {e} {:?}", clip.joints.iter().map(|j| &j.name).collect::<Vec<_>>()); continue; }
+        };
         let r = &done.report;
         println!(
-            "{file:15} {:4} f {:5.1} fps {:?} it {} {:6.0} f/s  kp {:.4} {:.4}  skate {:.4} pen {:.4} {:.4} float {:.4} lim {} cycle {:?} {:.3}",
+            "{name:45} {:4}f {:3.0}Hz {:?} it {} {:5.0}f/s kp {:.4} {:.4} skate {:.4} pen {:.4} {:.4} flt {:.4} lim {} cyc {:.3} {:.3} {:.3}",
             r.frames, clip.fps, clip.loop_mode, done.iterations, r.frames as f64 / done.seconds,
             r.keypoint_error_m.mean, r.keypoint_error_m.max, r.foot_skate_m_s, r.penetration_m.mean, r.penetration_m.max,
-            r.float_m, r.joint_limit_violations, done.motion.cycle.translation.as_slice(), done.motion.cycle.heading,
+            r.float_m, r.joint_limit_violations, done.motion.cycle.translation.x, done.motion.cycle.translation.y, done.motion.cycle.heading,
         );
+        if std::env::var("DUMP").is_ok() {
+            let b = |s: humanoid::Slot| skeleton.slots[&s];
+            use humanoid::Slot::*;
+            for f in (0..r.frames).step_by((r.frames / 16).max(1)) {
+                let at = |s| { let v = done.motion.bodies[f][b(s)].translation.vector; format!("{:5.2} {:5.2} {:5.2}", v.x, v.y, v.z) };
+                let knee = |s| { let j = &skeleton.bodies[b(s)].joints[0]; done.motion.qpos[f][j.qpos] };
+                println!("  {f:3} hips {} lf {} rf {} lh {} rh {} knees {:.2} {:.2} elbows {:.2} {:.2} c {:?}", at(Hips), at(LeftFoot), at(RightFoot), at(LeftHand), at(RightHand),
+                    knee(LeftLowerLeg), knee(RightLowerLeg), knee(LeftLowerArm), knee(RightLowerArm), done.motion.tracks.contact[f]);
+            }
+        }
     }
 }
