@@ -1,6 +1,7 @@
 //! What can go wrong between a file and a clip.
 
 use super::deepmimic::DeepMimicError;
+use super::fbx::FbxError;
 use super::gltf::GltfError;
 
 /// Why a file couldn't become a clip. Every message names the file and says what to do.
@@ -16,6 +17,8 @@ pub enum Error {
     TooLarge { file: String, size: u64, limit: u64 },
     #[error("{file}: {reason}")]
     Unsupported { file: String, reason: String },
+    #[error("{file}: {source}")]
+    Fbx { file: String, source: FbxError },
     #[error("{file}: {source}")]
     Gltf { file: String, source: GltfError },
     #[error("{file}: {source}")]

@@ -11,7 +11,7 @@ mod error;
 mod facing;
 mod gltf;
 mod rigid;
-pub(crate) mod fbx;
+mod fbx;
 mod scene;
 mod seam;
 mod take;
@@ -20,6 +20,7 @@ mod tree;
 pub use axes::{UnknownAxis, UpAxis};
 pub use deepmimic::DeepMimicError;
 pub use error::Error;
+pub use fbx::FbxError;
 pub use gltf::GltfError;
 
 use crate::clip::{Clip, Grid, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity, Source};
@@ -133,13 +134,10 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
                 source,
             })?)
         }
-        Format::Fbx => {
-            let reason = "binary FBX has no reader in this build; convert it to glTF".to_owned();
-            return Err(Error::Unsupported {
-                file: owned(),
-                reason,
-            });
-        }
+        Format::Fbx => Box::new(fbx::read(bytes).map_err(|source| Error::Fbx {
+            file: owned(),
+            source,
+        })?),
     })
 }
 

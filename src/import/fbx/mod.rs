@@ -32,7 +32,7 @@ use transform::World;
 
 /// Why a file can't be read as FBX.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum FbxError {
+pub enum FbxError {
     #[error("not an FBX file")]
     NotFbx,
     #[error("ASCII FBX isn't supported; save as binary FBX 7.4 or newer")]
