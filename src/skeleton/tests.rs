@@ -309,3 +309,15 @@ fn torque_motors_become_drives() {
         (400.0, 40.0, 100.0)
     );
 }
+
+/// The deepest tree that the guard lets through fits a thread's usual stack.
+#[test]
+fn deep_trees_load() {
+    let open = r#"<body><joint axis="0 1 0"/><geom size="0.1"/>"#.repeat(90);
+    let xml = format!(
+        r#"<mujoco><worldbody><body name="pelvis"><freejoint/><geom size="0.1"/>{open}{}</body></worldbody></mujoco>"#,
+        "</body>".repeat(90)
+    );
+    let s = Skeleton::from_mjcf("deep", &xml, None).expect("valid MJCF");
+    assert_eq!((s.bodies.len(), s.nq), (91, 97));
+}
