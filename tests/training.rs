@@ -1,0 +1,85 @@
+//! A run learns the same bits at any number of threads, and after being killed and resumed.
+
+use mimic::import;
+use mimic::learn::{Config, Plan, Run, Trainer};
+use mimic::motion::Motion;
+use mimic::retarget;
+use mimic::skeleton::Skeleton;
+use mimic::task::Stage;
+use std::path::Path;
+
+fn skeleton() -> Skeleton {
+    Skeleton::load("humanoid").expect("the built-in humanoid loads")
+}
+
+fn kick() -> Motion {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("clips/kick.fbx");
+    let clip = import::load(file, &import::Options::default()).expect("our own kick reads");
+    retarget::retarget(&clip, &skeleton(), &Default::default()).expect("our own kick retargets").motion
+}
+
+fn tiny() -> Plan {
+    Plan {
+        ppo: Config { minibatch: 64, ..Plan::default().ppo },
+        hidden: vec![32, 16],
+        environments: 12,
+        group: 4,
+        horizon: 16,
+        round: 2,
+        samples: 12 * 16 * 6,
+        ..Plan::default()
+    }
+}
+
+fn learned(trainer: &mut Trainer, iterations: usize) -> Vec<u32> {
+    for _ in 0..iterations {
+        let metrics = trainer.iterate().expect("training stays finite");
+        assert!(metrics.update.steps > 0, "an iteration learned nothing");
+    }
+    trainer.learner().parameters().iter().map(|p| p.to_bits()).collect()
+}
+
+fn on_threads(threads: usize, work: impl FnOnce() -> Vec<u32> + Send) -> Vec<u32> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start").install(work)
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_at_any_number_of_threads() {
+    let train = |seed| {
+        let plan = Plan { seed, ..tiny() };
+        let mut trainer = Trainer::new(plan, Stage::new(skeleton()).expect("a stage"), &[kick()]).expect("a trainer");
+        learned(&mut trainer, 4)
+    };
+    let one = on_threads(1, || train(7));
+    assert_eq!(one, on_threads(2, || train(7)), "two threads learned something else");
+    assert_eq!(one, on_threads(5, || train(7)), "five threads learned something else");
+    assert_ne!(one, on_threads(1, || train(8)), "the seed changes nothing");
+}
+
+#[test]
+fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let whole = Run::create(&folder.path().join("whole"), tiny(), skeleton(), vec![kick()]).expect("a run");
+    let unbroken = learned(&mut whole.trainer().expect("a trainer"), 6);
+
+    let path = folder.path().join("broken");
+    let run = Run::create(&path, tiny(), skeleton(), vec![kick()]).expect("a run");
+    let mut trainer = run.trainer().expect("a trainer");
+    learned(&mut trainer, 4);
+    assert!(trainer.is_between_rounds());
+    run.save(&trainer).expect("the checkpoint is saved");
+    learned(&mut trainer, 1);
+    drop((run, trainer));
+
+    let mut resumed = Run::open(&path).expect("the run opens").trainer().expect("a trainer");
+    assert_eq!(resumed.iteration(), 4);
+    assert_eq!(unbroken, learned(&mut resumed, 2), "the resumed run learned something else");
+}
+
+#[test]
+fn a_run_is_never_overwritten() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    Run::create(folder.path(), tiny(), skeleton(), vec![kick()]).expect("a run");
+    let again = Run::create(folder.path(), tiny(), skeleton(), vec![kick()]);
+    assert!(again.err().expect("refused").to_string().contains("already holds a run"));
+}
