@@ -9,7 +9,7 @@ use crate::rig::{BALL_HEIGHT, HIPS, Pose, Rig, UP_LEG, V3};
 use crate::spline::{MinJerk, jet};
 use nalgebra::{DMatrix, DVector};
 
-pub const FPS: f64 = 60.0;
+pub const FPS: f64 = crate::fbx::FPS as f64;
 pub const FRAMES: usize = 121;
 /// The kicking foot leaves the ground and comes back, s.
 pub const LIFT_OFF: f64 = 0.60;
@@ -18,8 +18,11 @@ const HEEL_OFF: f64 = 0.26;
 const HEEL_DOWN: f64 = 1.88;
 const END: f64 = 2.0;
 
-/// Rounds of balancing, and the parts of the model that steers them (the true body is measured in every round).
+/// Each round measures the true body and corrects by the model below.
 const ROUNDS: usize = 20;
+/// Part of a round's correction that is taken.
+const STEP: f64 = 0.7;
+/// Length of the inverted pendulum, m, and the part of the body that goes where the pelvis goes.
 const COM_HEIGHT: f64 = 0.95;
 const MOVED_FRACTION: f64 = 0.85;
 /// Pelvis offsets are kept to a thousandth of a millimetre, so that other machines' rounding gives the same file.
@@ -56,7 +59,7 @@ fn curves(keys: &[(f64, [f64; 3])]) -> [MinJerk; 3] {
     })
 }
 
-/// Middle of the standing (left) foot's sole, and of the kicking foot's in the stance.
+/// The standing foot's ankle, and the kicking foot's ball in the stance: left, forward (m), and turned out (degrees).
 const LEFT_ANKLE: [f64; 2] = [0.090, 0.150];
 const LEFT_YAW: f64 = 12.0;
 const RIGHT_BALL: [f64; 2] = [-0.155, -0.050];
@@ -276,7 +279,7 @@ pub fn poses(rig: &Rig) -> Vec<Pose> {
             .map(|(k, p)| wanted(time(k)).0 - p)
             .collect();
         for (offset, change) in offsets.iter_mut().zip(filter.answer(&error)) {
-            *offset += change * 0.7;
+            *offset += change * STEP;
         }
     }
     offsets
@@ -307,7 +310,8 @@ struct Filter {
 }
 
 impl Filter {
-    const JERK_PRICE: f64 = 2e-7;
+    /// Against one squared metre of error, per (m/s³)² of jerk and per squared metre between frames at rest.
+    const JERK_PRICE: f64 = 2e-10;
     const REST_PRICE: f64 = 1e6;
 
     fn new() -> Self {
@@ -323,7 +327,7 @@ impl Filter {
             }
         };
         for k in 3..n {
-            let jerk = FPS.powi(3) * FPS.powi(3) * Self::JERK_PRICE * 1e-3;
+            let jerk = FPS.powi(6) * Self::JERK_PRICE;
             add(
                 &[(k, 1.0), (k - 1, -3.0), (k - 2, 3.0), (k - 3, -1.0)],
                 jerk,

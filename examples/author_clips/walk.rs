@@ -35,9 +35,11 @@ pub const ANKLE_FLEXION: [f64; 10] = [0.0, -4.0, 4.0, 7.0, 10.0, 6.0, -17.0, -9.
 
 /// Ankles to the side of the line of progression, m.
 const STEP_HALF_WIDTH: f64 = 0.045;
+/// Degrees.
 const TOE_OUT: f64 = 7.0;
-/// The pelvis's part of the stride at heel strike by which it trails the ankle, m.
+/// Flat foot's ankle before the hips at heel strike, m.
 const ANKLE_LEAD: f64 = 0.303;
+/// Mean height of the hip joints, and how far they rise above and fall below it, m.
 const HIP_LINE: f64 = 0.870;
 const RISE: f64 = 0.0135;
 /// Length of the inverted pendulum, m.
@@ -49,16 +51,21 @@ const UNDER_BALL: f64 = 0.160;
 const LANDING: [f64; 3] = [0.0, -0.25, 0.60];
 /// Added to the swinging foot, for the toes that the tables don't know, m.
 const CLEARANCE: f64 = 0.016;
+/// Each round measures the true body and corrects by the model of `answer`.
 const ROUNDS: usize = 15;
+/// Part of a round's correction that is taken.
+const STEP: f64 = 0.7;
 /// Samples per cycle while balancing.
 const FINE: usize = 4 * CYCLE_FRAMES;
 const SWAY_HARMONICS: usize = 6;
+/// Offsets are kept to a thousandth of a millimetre, so that other machines' rounding gives the same file.
 const GRAIN: f64 = 1e-6;
 
 /// What repeats in every cycle.
 struct Gait {
     /// Pelvis offset from even travel, found by balancing.
     sway: [Fourier; 2],
+    /// Pitch of the foot, and of its toes, against the ground; flat before the first point and after the last.
     pitch: MinJerk,
     toes: MinJerk,
     /// Path of the swinging left ankle from its standing place.
@@ -86,7 +93,7 @@ pub fn poses(rig: &Rig) -> Vec<Pose> {
         let change = [0, 1].map(|i| answer(&error, i));
         for (k, offset) in offsets.iter_mut().enumerate() {
             let phase = k as f64 / FINE as f64;
-            *offset += Ground::new(change[0].at(phase), change[1].at(phase)) * 0.7;
+            *offset += Ground::new(change[0].at(phase), change[1].at(phase)) * STEP;
         }
         gait.sway = [0, 1].map(|i| sway(&offsets, i));
     }
