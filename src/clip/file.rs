@@ -123,7 +123,7 @@ impl Clip {
     }
 
     /// The clip that a file's bytes hold, or what is wrong with them.
-    fn from_bytes(bytes: &[u8]) -> Result<Clip, String> {
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Clip, String> {
         let tensors =
             SafeTensors::deserialize(bytes).map_err(|e| format!("not safetensors ({e})"))?;
         let header = header(bytes)?;

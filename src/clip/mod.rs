@@ -3,6 +3,8 @@
 mod error;
 mod file;
 mod sampling;
+#[cfg(test)]
+mod tests;
 
 pub use error::Error;
 pub(crate) use sampling::{Grid, MOST_TRANSFORMS, slerp};

@@ -106,7 +106,7 @@ impl Clip {
         let duration = self.duration();
         let end = to.min(duration);
         let start = from.max(0.0);
-        if !(start <= end && start <= duration) {
+        if !(from <= to && start <= end) {
             return Err(Error::EmptyTrim { from, to, duration });
         }
         let whole = start <= 0.0 && end >= duration;

@@ -60,18 +60,15 @@ fn sideless(name: &str, word: &str, letter: &str) -> Option<String> {
 pub(crate) fn turn_to_forward(pairs: &[Pair]) -> Option<f64> {
     let across: Vector3<f64> = pairs.iter().map(|(left, right)| left - right).sum();
     let forward = across.cross(&Vector3::z());
-    if !(forward.norm() > 0.5 * across.norm()) {
-        return None;
-    }
+    let tells = forward.norm() > 0.5 * across.norm();
     let turn = -forward.y.atan2(forward.x);
-    let quarters = (turn / FRAC_PI_2).round();
-    let snapped = quarters * FRAC_PI_2;
+    let snapped = (turn / FRAC_PI_2).round() * FRAC_PI_2;
     let turn = if (turn - snapped).abs() < SNAP {
         snapped
     } else {
         turn
     };
-    Some(if turn <= -PI { PI } else { turn })
+    tells.then_some(if turn <= -PI { PI } else { turn })
 }
 
 /// Rotation about +Z, exact for quarter turns.

@@ -10,9 +10,11 @@ const SEAM_MAX: f64 = 0.04;
 const SEAM_OF_RANGE: f64 = 0.2;
 /// Pose change, relative to height, below which a clip stands still and has nothing to repeat.
 const STILL: f64 = 0.002;
-/// Velocity across the seam may jump this much more than the median jump between frames within the clip …
+/// Velocity across the seam may jump by so many times the median jump between frames within the clip, …
 const JUMP_OF_MEDIAN: f64 = 4.0;
-/// … or by this part of the clip's root mean square speed.
+/// … or this part of the largest one, …
+const JUMP_OF_LARGEST: f64 = 0.5;
+/// … or this part of the clip's root mean square speed.
 const JUMP_OF_SPEED: f64 = 0.25;
 /// Fewest frames in which a cycle can be seen.
 const FEWEST: usize = 5;
@@ -59,7 +61,7 @@ pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
 }
 
 /// Whether the jump in velocity at the seam (metres per frame) is no more than the clip itself has.
-fn runs_on(frames: &[Places], jump: &Places) -> bool {
+fn runs_on(frames: &[Places], jump: &[Vector3<f64>]) -> bool {
     let steps: Vec<Places> = frames
         .windows(2)
         .map(|w| difference(&w[0], &w[1]))
@@ -70,9 +72,15 @@ fn runs_on(frames: &[Places], jump: &Places) -> bool {
         .collect();
     jumps.sort_by(f64::total_cmp);
     let median = jumps.get(jumps.len() / 2).copied().unwrap_or(0.0);
+    let largest = jumps.last().copied().unwrap_or(0.0);
     let square: f64 = steps.iter().map(|step| rms(step).powi(2)).sum();
     let speed = (square / steps.len().max(1) as f64).sqrt();
-    rms(jump) <= (JUMP_OF_MEDIAN * median).max(JUMP_OF_SPEED * speed)
+    let limits = [
+        JUMP_OF_MEDIAN * median,
+        JUMP_OF_LARGEST * largest,
+        JUMP_OF_SPEED * speed,
+    ];
+    limits.iter().any(|limit| rms(jump) <= *limit)
 }
 
 /// Places of the joints that move at all: a file's still armature nodes don't travel with the character.
@@ -171,4 +179,69 @@ impl Carry {
 fn centre(places: &[Vector3<f64>]) -> Vector2<f64> {
     let sum: Vector2<f64> = places.iter().map(|p| p.xy()).sum();
     sum / places.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use std::f64::consts::TAU;
+
+    /// A walker of two swinging legs under a root, `turns` of whose cycle take `frames` frames, on a circle of
+    /// radius 3 m, with a joint that stays behind at the origin.
+    fn walker(frames: usize, turns: f64, lean: f64) -> Vec<Vec<Isometry3<f64>>> {
+        let frame = |f: usize| {
+            let done = f as f64 / (frames - 1) as f64;
+            let swing = (TAU * turns * done).sin();
+            let root = Isometry3::from_parts(
+                Vector3::new(3.0 * done.sin(), 3.0 - 3.0 * done.cos(), 1.0).into(),
+                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), done),
+            );
+            let at = |x: f64, y: f64, z: f64| root * Isometry3::translation(x + lean * done, y, z);
+            let legs = [at(0.5 * swing, 0.1, -0.9), at(-0.5 * swing, -0.1, -0.9)];
+            vec![
+                Isometry3::identity(),
+                root,
+                legs[0],
+                legs[1],
+                at(0.0, 0.0, 0.7),
+            ]
+        };
+        (0..frames).map(frame).collect()
+    }
+
+    #[test]
+    fn whole_cycles_wrap_even_along_a_curve() {
+        assert!(wraps(&walker(31, 1.0, 0.0)));
+        assert!(wraps(&walker(61, 2.0, 0.0)));
+    }
+
+    #[test]
+    fn parts_of_a_cycle_do_not() {
+        for turns in [0.25, 0.8, 0.9, 1.1, 1.5] {
+            assert!(!wraps(&walker(31, turns, 0.0)), "{turns}");
+        }
+    }
+
+    #[test]
+    fn a_pose_passed_the_other_way_does_not_close_a_cycle() {
+        // After half a swing the legs are where they were, but go back.
+        let half = walker(31, 0.5, 0.0);
+        assert!(!wraps(&half));
+    }
+
+    #[test]
+    fn a_changed_pose_does_not_wrap() {
+        assert!(wraps(&walker(31, 1.0, 0.02)));
+        assert!(!wraps(&walker(31, 1.0, 0.2)));
+    }
+
+    #[test]
+    fn stills_and_stubs_do_not() {
+        let still = walker(31, 1.0, 0.0)[0].clone();
+        assert!(!wraps(&vec![still.clone(); 31]));
+        assert!(!wraps(&[still.clone(), still]));
+        assert!(!wraps(&[]));
+        assert!(!wraps(&vec![Vec::new(); 9]));
+    }
 }

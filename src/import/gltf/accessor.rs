@@ -57,7 +57,7 @@ impl<'a> Accessors<'a> {
             .is_some_and(|about| about.count == 0)
     }
 
-    /// All numbers of an accessor whose elements are of type `shape` (`SCALAR`, `VEC3`, `VEC4`), in order.
+    /// All numbers of an accessor whose elements are of type `shape` (`SCALAR`, `VEC3`, `VEC4`, `MAT4`), in order.
     pub fn read(&mut self, accessor: usize, shape: &str) -> Result<Rc<[f64]>, GltfError> {
         let broken = |reason: String| GltfError::Accessor { accessor, reason };
         let about = self.document.accessors.get(accessor);
@@ -81,6 +81,7 @@ impl<'a> Accessors<'a> {
             "SCALAR" => 1,
             "VEC3" => 3,
             "VEC4" => 4,
+            "MAT4" => 16,
             other => return Err(format!("elements of type {other}")),
         };
         let length = about.count.checked_mul(width).ok_or("too many elements")?;

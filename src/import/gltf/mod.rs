@@ -1,6 +1,7 @@
 //! glTF 2.0: `.gltf` with embedded or neighbouring buffers, and GLB.
 
 mod accessor;
+mod bind;
 mod buffer;
 mod container;
 mod curve;
@@ -34,6 +35,8 @@ const HARMLESS: [&str; 4] = [
 /// A glTF file's nodes and animations.
 pub(crate) struct GltfScene {
     tree: Tree,
+    /// Nodes that stand elsewhere in their parents in the pose that their skin was bound in.
+    bound: Vec<Option<Matrix4<f64>>>,
     takes: Vec<Take>,
     curves: Vec<Curves>,
     problems: Vec<Problem>,
@@ -68,12 +71,25 @@ fn scene(
         takes.push(found.take(name));
         curves.push(found);
     }
+    let bound = bind::pose(document, &tree, &mut accessors);
+    problems.extend(bound.is_some().then(posed_nodes));
+    let bound = bound.unwrap_or_default();
     Ok(GltfScene {
+        bound,
         tree,
         takes,
         curves,
         problems,
     })
+}
+
+fn posed_nodes() -> Problem {
+    Problem {
+        id: "rest-from-bind-pose".to_owned(),
+        severity: Severity::Note,
+        message: "the nodes stand in a pose of their own; the skin's bind pose is taken as rest"
+            .to_owned(),
+    }
 }
 
 fn extension_problems(document: &Document) -> Vec<Problem> {
@@ -122,9 +138,18 @@ impl Scene for GltfScene {
         let moved = at.and_then(|(take, time)| Some((self.curves.get(take)?, time)));
         let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(self.tree.nodes.len());
         for (at, (node, rest)) in self.tree.nodes.iter().zip(&self.tree.rest).enumerate() {
-            let placed =
-                moved.and_then(|(curves, time)| curves.placement(at, &rest.placement, time));
-            let local = placed.map_or_else(|| rest.matrix(), |placement| placement.matrix());
+            let bound = || {
+                self.bound
+                    .get(at)
+                    .copied()
+                    .flatten()
+                    .filter(|_| moved.is_none())
+            };
+            let local = moved
+                .and_then(|(curves, time)| curves.placement(at, &rest.placement, time))
+                .map(|placement| placement.matrix())
+                .or_else(bound)
+                .unwrap_or_else(|| rest.matrix());
             world.push(node.parent.map_or(local, |parent| world[parent] * local));
         }
         world

@@ -1,0 +1,263 @@
+use super::*;
+use approx::assert_relative_eq;
+use nalgebra::{UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// An arm that turns at 1 rad/s about its parent's Z, which moves at 2 m/s along X.
+fn arm(frames: usize, fps: f64) -> Clip {
+    let joint = |name: &str, parent| Joint {
+        name: name.to_owned(),
+        parent,
+        rest: Isometry3::translation(0.0, 0.0, 1.0),
+    };
+    let frame = |f: usize| {
+        let time = f as f64 / fps;
+        vec![
+            Isometry3::translation(2.0 * time, 0.0, 1.0),
+            Isometry3::new(Vector3::new(0.0, 0.5, 0.0), Vector3::new(0.0, 0.0, time)),
+        ]
+    };
+    Clip {
+        name: "arm".to_owned(),
+        fps,
+        loop_mode: LoopMode::Wrap,
+        joints: vec![joint("root", None), joint("arm", Some(0))],
+        frames: (0..frames).map(frame).collect(),
+        source: Source {
+            file: "arm.glb".to_owned(),
+            sha256: "00".to_owned(),
+            format: "gltf".to_owned(),
+            take: "swing".to_owned(),
+            fps,
+            up_axis: "+Y".to_owned(),
+            unit_m: 1.0,
+        },
+        problems: vec![Problem {
+            id: "turned-to-forward".to_owned(),
+            severity: Severity::Note,
+            message: "turned 90° about the up axis".to_owned(),
+        }],
+    }
+}
+
+#[test]
+fn sampling_follows_the_motion_between_frames() {
+    let clip = arm(31, 30.0);
+    for time in [0.0, 0.01, 0.37, 0.5, 0.999, 1.0] {
+        let [root, arm] = clip.sample(time)[..] else {
+            panic!("two joints")
+        };
+        assert_relative_eq!(root.translation.x, 2.0 * time, epsilon = 1e-12);
+        assert_relative_eq!(arm.rotation.angle(), time, epsilon = 1e-12);
+    }
+    assert_eq!(clip.sample(-1.0), clip.frames[0]);
+    assert_eq!(clip.sample(9.0), clip.frames[30]);
+    assert_eq!(clip.sample(7.0 / 30.0), clip.frames[7]);
+}
+
+#[test]
+fn resampling_keeps_both_ends_and_the_loop() {
+    let clip = arm(31, 30.0);
+    let fast = clip.resample(120.0).expect("it resamples");
+    assert_eq!(
+        (fast.frames.len(), fast.fps, fast.loop_mode),
+        (121, 120.0, LoopMode::Wrap)
+    );
+    assert_eq!(fast.frames[120], clip.frames[30]);
+    assert_relative_eq!(
+        fast.frames[33][1].rotation.angle(),
+        33.0 / 120.0,
+        epsilon = 1e-12
+    );
+    // Frames can't fall on both ends at 25.3 Hz; 25 Hz is the nearest rate at which they do.
+    let odd = clip.resample(25.3).expect("it resamples");
+    assert_eq!((odd.frames.len(), odd.fps), (26, 25.0));
+    let back = fast.resample(30.0).expect("it resamples");
+    assert_eq!(back.frames, clip.frames);
+}
+
+#[test]
+fn trimming_takes_the_part_and_ends_the_loop() {
+    let clip = arm(31, 30.0);
+    let part = clip.trim(0.2, 0.5).expect("it trims");
+    assert_eq!(
+        (part.frames.len(), part.fps, part.loop_mode),
+        (10, 30.0, LoopMode::Clamp)
+    );
+    assert_relative_eq!(part.frames[0][0].translation.x, 0.4, epsilon = 1e-12);
+    assert_relative_eq!(part.frames[9][0].translation.x, 1.0, epsilon = 1e-12);
+    assert_eq!(clip.trim(0.0, 99.0).expect("it trims"), clip);
+    assert!(clip.trim(1.5, 2.0).is_err());
+    assert!(clip.trim(0.5, 0.2).is_err());
+    assert!(clip.trim(f64::NAN, 1.0).is_err());
+}
+
+#[test]
+fn rates_that_cannot_be_sampled_are_refused() {
+    for fps in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e9] {
+        assert!(arm(31, 30.0).resample(fps).is_err(), "{fps}");
+    }
+}
+
+#[test]
+fn the_file_gives_the_clip_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("arm.clip");
+    let clip = arm(31, 30.0);
+    clip.save(&path).expect("it is written");
+    let back = Clip::load(&path).expect("it is read");
+    assert_eq!(back.source, clip.source);
+    assert_eq!(back.problems, clip.problems);
+    assert_eq!(
+        (back.name.as_str(), back.fps, back.loop_mode),
+        ("arm", 30.0, LoopMode::Wrap)
+    );
+    assert_eq!(back.joints, clip.joints);
+    for (back, clip) in back
+        .frames
+        .iter()
+        .flatten()
+        .zip(clip.frames.iter().flatten())
+    {
+        assert_relative_eq!(back.to_homogeneous(), clip.to_homogeneous(), epsilon = 3e-7);
+    }
+    // Nothing else is left in the folder, and writing again gives the same bytes.
+    let bytes = std::fs::read(&path).expect("bytes");
+    clip.save(&path).expect("it is written again");
+    assert_eq!(std::fs::read(&path).expect("bytes"), bytes);
+    assert_eq!(
+        std::fs::read_dir(folder.path()).expect("a folder").count(),
+        1
+    );
+}
+
+#[test]
+fn any_safetensors_reader_finds_the_named_tensors() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("arm.clip");
+    arm(5, 30.0).save(&path).expect("it is written");
+    let bytes = std::fs::read(&path).expect("bytes");
+    let file = safetensors::SafeTensors::deserialize(&bytes).expect("safetensors");
+    let shape = |name: &str| file.tensor(name).expect("a tensor").shape().to_vec();
+    assert_eq!(shape("parent"), [2]);
+    assert_eq!(shape("rest_translation"), [2, 3]);
+    assert_eq!(shape("rest_rotation"), [2, 4]);
+    assert_eq!(shape("local_translation"), [5, 2, 3]);
+    assert_eq!(shape("local_rotation"), [5, 2, 4]);
+    let first: Vec<u8> = [1.0f32, 0.0, 0.0, 0.0]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    assert_eq!(
+        file.tensor("local_rotation").expect("a tensor").data()[..16],
+        first
+    );
+}
+
+/// The error of loading `bytes` as a clip file.
+fn refusal(bytes: &[u8]) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("broken.clip");
+    std::fs::write(&path, bytes).expect("it is written");
+    let error = Clip::load(&path).expect_err("refused").to_string();
+    assert!(error.contains("broken.clip"), "{error}");
+    error
+}
+
+fn saved(clip: &Clip) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("arm.clip");
+    clip.save(&path).expect("it is written");
+    std::fs::read(&path).expect("bytes")
+}
+
+/// Puts other text of the same length into a file's header.
+fn replaced(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    assert_eq!(from.len(), to.len());
+    let at = bytes
+        .windows(from.len())
+        .position(|w| w == from.as_bytes())
+        .expect("the text");
+    let mut bytes = bytes.to_vec();
+    bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+    bytes
+}
+
+#[test]
+fn broken_clip_files_are_refused_with_a_reason() {
+    let bytes = saved(&arm(5, 30.0));
+    let cases = [
+        (r#"\"version\":1"#, r#"\"version\":7"#, "version 7"),
+        (
+            r#"\"format\":\"clip\""#,
+            r#"\"format\":\"clap\""#,
+            "`clap` file",
+        ),
+        (
+            r#"\"fps\":30.0,\"joints\""#,
+            r#"\"fps\":-3.0,\"joints\""#,
+            "rate of -3",
+        ),
+        (
+            r#"[\"root\",\"arm\"]"#,
+            r#"[\"root arm xxx\"]"#,
+            "tensor `parent` is I32 [2]",
+        ),
+        (
+            r#""local_rotation""#,
+            r#""local_rotatio_""#,
+            "no tensor `local_rotation`",
+        ),
+        (r#""mimic""#, r#""mimik""#, "no `mimic`"),
+    ];
+    for (from, to, reason) in cases {
+        let error = refusal(&replaced(&bytes, from, to));
+        assert!(error.contains(reason), "{error}");
+    }
+    assert!(refusal(b"").contains("safetensors"));
+    let mut clip = arm(5, 30.0);
+    clip.joints[0].parent = Some(1);
+    assert!(refusal(&saved(&clip)).contains("joint 0 `root` has parent 1"));
+    clip.joints[0].parent = None;
+    clip.frames[3][1].translation.x = f64::NAN;
+    assert!(refusal(&saved(&clip)).contains("element 21 is not a finite number"));
+    clip.frames[3][1].translation.x = 0.0;
+    clip.frames[2][0].rotation =
+        UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 0.0));
+    assert!(refusal(&saved(&clip)).contains("rotation 4 is zero"));
+    clip.frames.clear();
+    assert!(refusal(&saved(&clip)).contains("0 frames"));
+}
+
+#[test]
+fn no_damage_to_a_clip_file_brings_the_reader_down() {
+    let bytes = saved(&arm(5, 30.0));
+    let mut state: u64 = 1;
+    for round in 0..1500 {
+        let mut damaged = bytes.clone();
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let at = (state >> 33) as usize % damaged.len();
+        if round % 3 == 0 {
+            damaged.truncate(at);
+        } else {
+            damaged[at] ^= 1 << (state >> 20 & 7);
+        }
+        if let Ok(clip) = Clip::from_bytes(&damaged) {
+            assert!(
+                clip.frames
+                    .iter()
+                    .all(|frame| frame.len() == clip.joints.len())
+            );
+        }
+    }
+}
+
+#[test]
+fn a_clip_that_cannot_be_written_leaves_the_old_one() {
+    let error = arm(5, 30.0)
+        .save(Path::new("/nowhere/at/all/a.clip"))
+        .expect_err("refused");
+    assert!(error.to_string().contains("/nowhere/at/all/a.clip"));
+}
