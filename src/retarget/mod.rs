@@ -104,8 +104,8 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
             loop_mode: if wraps { LoopMode::Wrap } else { LoopMode::Clamp },
             cycle: cycle.unwrap_or(STILL),
             qpos,
+            contact: Some(stance::contact(&model, &anchors, &contact_bodies)),
             contact_bodies,
-            contact: None,
             report: serde_json::Value::Null,
         },
     );

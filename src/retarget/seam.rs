@@ -10,6 +10,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 const STRAIGHT: f64 = 0.0175;
 /// Time on either side of the seam over which its gap is spread, s.
 const SPREAD: f64 = 0.25;
+/// The same as a part of the cycle; the smaller counts.
+const SHARE: f64 = 0.1;
 
 /// The turn about Z and shift over the ground that carry the first frame's root to the last frame's. A turn no
 /// larger than the gap that the joints leave at the seam is part of that gap: such a cycle goes straight.
@@ -52,7 +54,7 @@ pub(super) fn close(goals: &mut Goals, cycle: &Cycle, model: &Model, fps: f64) {
     let carried = super::solve::carried(&goals.guess[0], turn.to_rotation_matrix().matrix(), &cycle.translation);
     let mut joints = vec![0.0; model.skeleton.nv];
     model.difference(&goals.guess[last], &carried, &mut joints);
-    let spread = ((SPREAD * fps).round() as usize).clamp(1, last / 2);
+    let spread = ((SPREAD * fps).min(SHARE * last as f64).round() as usize).clamp(1, last / 2);
     for away in 0..=spread {
         let left = 1.0 - away as f64 / (spread + 1) as f64;
         let half = 0.5 * left * left * (3.0 - 2.0 * left);

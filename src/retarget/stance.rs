@@ -67,6 +67,18 @@ pub(super) fn contact_bodies(model: &Model, goals: &Goals, anchors: &[Vec<Anchor
     bodies
 }
 
+/// Weight from which on an anchor means contact.
+const TOUCHES: f64 = 0.5;
+
+/// `contact[f][c]`: whether contact body `c` stands at frame `f`.
+pub(super) fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) -> Vec<Vec<bool>> {
+    let stands = |frame: &Vec<Anchor>, body: usize| {
+        frame.iter().any(|a| a.weight >= TOUCHES && model.knobs[a.knob].body == body)
+    };
+    let row = |frame: &Vec<Anchor>| bodies.iter().map(|b| stands(frame, *b)).collect();
+    anchors.iter().map(row).collect()
+}
+
 /// `paths[limb][knob][f]`: centre of a limb's knob when the limb's key is at its goal.
 fn paths(model: &Model, goals: &Goals, limbs: &[Limb]) -> Vec<Vec<Vec<Vector3<f64>>>> {
     let mut pose: Pose = model.empty_pose();

@@ -17,7 +17,7 @@ fn explore() {
     let names = std::env::var("CLIPS").unwrap_or("deepmimic/humanoid3d_walk.txt".into());
     for name in names.split(',') {
         let (file, take) = name.split_once('@').map_or((name, None), |(f, t)| (f, Some(t)));
-        let Some(clip) = clip(file, take) else { return };
+        let Some(clip) = (if file.ends_with(".clip") { Some(Clip::load(file).unwrap()) } else { clip(file, take) }) else { return };
         let done = match retarget(&clip, &skeleton, &Options::default()) {
             Ok(done) => done,
             Err(e) => { println!("{name}: {e} {:?}", clip.joints.iter().map(|j| &j.name).collect::<Vec<_>>()); continue; }
@@ -29,6 +29,20 @@ fn explore() {
             r.keypoint_error_m.mean, r.keypoint_error_m.max, r.foot_skate_m_s, r.penetration_m.mean, r.penetration_m.max,
             r.float_m, r.joint_limit_violations, done.motion.cycle.translation.x, done.motion.cycle.translation.y, done.motion.cycle.heading,
         );
+        if std::env::var("SKATE").is_ok() {
+            let m = Model::new(&skeleton);
+            for f in 0..r.frames - 1 {
+                print!("  {f:3} ");
+                for (c, &b) in done.motion.contact_bodies.iter().enumerate() {
+                    let place = |f: usize, k: &model::Knob| done.motion.bodies[f][b] * nalgebra::Point3::from(k.center);
+                    let mut ks: Vec<_> = m.knobs.iter().filter(|k| k.body == b).collect();
+                    ks.sort_by(|x, y| (place(f, x).z - x.radius).total_cmp(&(place(f, y).z - y.radius)));
+                    let v = (place(f + 1, ks[0]) - place(f, ks[0])).xy().norm() * clip.fps;
+                    print!(" | {} c{} z{:.3} v{:.3}", skeleton.bodies[b].name, u8::from(done.motion.tracks.contact[f][c]), place(f, ks[0]).z - ks[0].radius, v);
+                }
+                println!();
+            }
+        }
         if std::env::var("DUMP").is_ok() {
             let b = |s: humanoid::Slot| skeleton.slots[&s];
             use humanoid::Slot::*;
