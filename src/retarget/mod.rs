@@ -7,6 +7,7 @@
 mod align;
 mod banded;
 mod cost;
+mod footing;
 mod goals;
 mod limits;
 mod model;
@@ -92,7 +93,7 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
     if let Some(cycle) = &cycle {
         seam::close(&mut goals, cycle, &model, clip.fps);
     }
-    let anchors = stance::anchors(&model, &goals, clip.fps, leg, cycle.as_ref());
+    let anchors = stance::plant(&model, &mut goals, clip.fps, leg, cycle.as_ref());
     let problem = Problem { model: &model, goals: &goals, anchors: &anchors, fps: clip.fps };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
     let contact_bodies = stance::contact_bodies(&model, &goals, &anchors);

@@ -1,5 +1,6 @@
 //! Which points of feet and hands rest on the ground when, and where; and how high the ground is.
 
+use super::footing;
 use super::goals::Goals;
 use super::model::{Model, Pose};
 use crate::clip::LoopMode;
@@ -30,9 +31,6 @@ const HANDS: [Slot; 2] = [Slot::LeftHand, Slot::RightHand];
 
 /// Heights, in leg lengths, up to which a standing point is held fully, and from which on not at all.
 const HELD: [f64; 2] = [0.015, 0.05];
-
-/// Frames before the first and after the last, s.
-const MARGIN: f64 = 0.5;
 
 fn limbs(model: &Model, goals: &Goals) -> Vec<Limb> {
     let slots = FEET.into_iter().map(|s| (s, true)).chain(HANDS.into_iter().map(|s| (s, false)));
@@ -125,7 +123,7 @@ pub(super) fn ground(model: &Model, goals: &Goals, fps: f64, leg: f64, loop_mode
     standing.get(standing.len() / 2).copied().unwrap_or(low)
 }
 
-/// The goals' timeline; a wrapping one continues on both sides so that stances may pass over the seam.
+/// The goals' timeline; a wrapping one goes on for a cycle on both sides, so that stances may pass over the seam.
 struct Timeline {
     frames: usize,
     margin: usize,
@@ -133,8 +131,8 @@ struct Timeline {
 }
 
 impl Timeline {
-    fn new(frames: usize, fps: f64, cycle: Option<&Cycle>) -> Timeline {
-        let margin = ((fps * MARGIN) as usize).min(frames.saturating_sub(1));
+    fn new(frames: usize, cycle: Option<&Cycle>) -> Timeline {
+        let margin = frames.saturating_sub(1);
         let step = cycle.map(|c| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), c.heading);
             Isometry3::from_parts(c.translation.into(), turn)
@@ -156,25 +154,42 @@ impl Timeline {
     }
 }
 
-/// Anchors of every frame, in the world of the goals, whose ground is at z = 0.
-pub(super) fn anchors(
+/// A knob that stands in a frame: where the goals have it, and where it should be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub knob: usize,
+    pub from: Vector3<f64>,
+    pub at: Vector3<f64>,
+    pub weight: f64,
+}
+
+/// Finds what stands on the ground, which is at z = 0, and moves the goals of feet and hands along with it.
+/// Returns the anchors of every frame.
+pub(super) fn plant(
     model: &Model,
-    goals: &Goals,
+    goals: &mut Goals,
     fps: f64,
     leg: f64,
     cycle: Option<&Cycle>,
 ) -> Vec<Vec<Anchor>> {
     let limbs = limbs(model, goals);
-    let timeline = Timeline::new(goals.frames(), fps, cycle);
+    let timeline = Timeline::new(goals.frames(), cycle);
     let mut anchors = vec![Vec::new(); goals.frames()];
     for (limb, paths) in limbs.iter().zip(paths(model, goals, &limbs)) {
+        let mut held: Vec<Vec<Held>> = vec![Vec::new(); goals.frames() + 2 * timeline.margin];
         for (&knob, path) in limb.knobs.iter().zip(&paths) {
             let path = timeline.extend(path);
             for (f, at, weight) in stances(&path, model.knobs[knob].radius, fps, leg) {
-                if let Some(frame) = f.checked_sub(timeline.margin).and_then(|f| anchors.get_mut(f)) {
-                    frame.push(Anchor { knob, at, weight });
-                }
+                held[f].push(Held { knob, from: path[f], at, weight });
             }
+        }
+        let own: Vec<Vector3<f64>> = goals.points.iter().map(|points| points[limb.key]).collect();
+        let moves = footing::moves(&held, &timeline.extend(&own), fps);
+        for f in 0..goals.frames() {
+            let here = timeline.margin + f;
+            let anchor = |h: &Held| Anchor { knob: h.knob, at: h.at, weight: h.weight };
+            anchors[f].extend(held[here].iter().map(anchor));
+            footing::apply(goals, f, limb.key, &moves[here]);
         }
     }
     anchors
