@@ -1,1 +1,18 @@
-fn main() {}
+//! `mimic`: from an animation clip to a physics character that performs it.
+
+mod args;
+mod failure;
+mod output;
+mod printer;
+mod verbs;
+mod viewer;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = args::Cli::parse();
+    let mut printer = printer::Printer::new(&cli.talk);
+    let outcome = verbs::run(cli.verb, &cli.library, &mut printer);
+    printer.finish(outcome)
+}

@@ -1,0 +1,93 @@
+//! Where results are written.
+
+use crate::failure::{Failure, Outcome};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Writes a file as a whole or not at all.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Outcome {
+    let name = path.file_name().ok_or_else(|| no_file_name(path))?;
+    let mut temporary = name.to_os_string();
+    temporary.push(format!(".{}.part", std::process::id()));
+    let temporary = path.with_file_name(temporary);
+    fs::write(&temporary, bytes)
+        .and_then(|()| fs::rename(&temporary, path))
+        .map_err(|e| {
+            fs::remove_file(&temporary).ok();
+            Failure::write(path, e)
+        })
+}
+
+/// Path of a result: the file `--out` names, or `NAME.EXTENSION` in the folder it names, or in this folder.
+pub fn result_path(out: Option<&Path>, name: &str, extension: &str) -> PathBuf {
+    let file = format!("{}.{extension}", file_name(name));
+    match out {
+        Some(out) if names_folder(out) => out.join(file),
+        Some(out) => out.to_path_buf(),
+        None => PathBuf::from(file),
+    }
+}
+
+/// Creates the folder of a result, and refuses to replace the input it comes from.
+pub fn make_room(path: &Path, input: &Path) -> Outcome {
+    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+        fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+    }
+    let same = match (path.canonicalize(), input.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    };
+    if same {
+        let path = path.display();
+        return Err(Failure::user(format!(
+            "`{path}` is the input itself, name another file with `--out`"
+        )));
+    }
+    Ok(())
+}
+
+/// Whether `--out` means a folder: it is one, or ends like one.
+pub fn names_folder(out: &Path) -> bool {
+    out.is_dir() || out.as_os_str().to_string_lossy().ends_with('/')
+}
+
+fn file_name(name: &str) -> String {
+    let clean = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
+    let name: String = name.chars().map(clean).collect();
+    let name = name.trim_matches(['-', '.']);
+    if name.is_empty() {
+        "clip".into()
+    } else {
+        name.into()
+    }
+}
+
+fn no_file_name(path: &Path) -> Failure {
+    Failure::user(format!("`{}` names no file", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_file_names() {
+        assert_eq!(file_name("mixamo.com|Take 001"), "mixamo.com-Take-001");
+        assert_eq!(file_name("../../x"), "x");
+        assert_eq!(file_name("…/"), "clip");
+    }
+
+    #[test]
+    fn out_is_a_file_or_a_folder() {
+        let path = |out: &str| result_path(Some(Path::new(out)), "kick", "clip");
+        assert_eq!(path("a/b.clip"), Path::new("a/b.clip"));
+        assert_eq!(path("a/"), Path::new("a/kick.clip"));
+        assert_eq!(result_path(None, "kick", "clip"), Path::new("kick.clip"));
+    }
+}

@@ -1,0 +1,30 @@
+//! `mimic completions`: shell completions.
+
+use crate::args::Cli;
+use crate::failure::Outcome;
+use crate::printer::Printer;
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic completions bash > ~/.local/share/bash-completion/completions/mimic
+  mimic completions zsh > ~/.zfunc/_mimic
+  mimic completions fish > ~/.config/fish/completions/mimic.fish";
+
+/// Print completions for a shell
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Shell that is to complete `mimic` commands
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+impl Args {
+    pub fn run(self, printer: &Printer) -> Outcome {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "mimic", &mut script);
+        printer.text(&String::from_utf8_lossy(&script))
+    }
+}

@@ -1,0 +1,55 @@
+//! `mimic man`: manual pages.
+
+use crate::args::Cli;
+use crate::failure::{Failure, Outcome};
+use crate::output::write_whole;
+use crate::printer::Printer;
+use clap::{Command, CommandFactory};
+use clap_mangen::Man;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic man | man -l -                              read the manual now
+  mimic man --out ~/.local/share/man/man1           a page for mimic, and one for every command";
+
+/// Print the manual page, or write a page for every command
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Folder for `mimic.1` and a page for every command
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Args {
+    pub fn run(self, printer: &Printer) -> Outcome {
+        let mut command = Cli::command().disable_help_subcommand(true);
+        command.build();
+        let Some(folder) = self.out else {
+            return printer.text(&page(command)?);
+        };
+        let pages = write_pages(&command, &folder)?;
+        printer.result(&json!({ "pages": pages }), || pages.join("\n"))
+    }
+}
+
+fn write_pages(command: &Command, folder: &Path) -> Outcome<Vec<String>> {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+    std::iter::once(command)
+        .chain(command.get_subcommands())
+        .map(|command| {
+            let name = command.get_display_name().unwrap_or(command.get_name());
+            let path = folder.join(format!("{name}.1"));
+            write_whole(&path, page(command.clone())?.as_bytes())?;
+            Ok(path.display().to_string())
+        })
+        .collect()
+}
+
+fn page(command: Command) -> Outcome<String> {
+    let mut page = Vec::new();
+    Man::new(command).render(&mut page)?;
+    Ok(String::from_utf8_lossy(&page).into_owned())
+}

@@ -1,0 +1,19 @@
+//! One file per verb: its arguments, and what it does with them.
+
+pub mod completions;
+pub mod doctor;
+pub mod man;
+
+use crate::args::Verb;
+use crate::failure::Outcome;
+use crate::printer::Printer;
+use std::path::Path;
+
+/// Runs one verb.
+pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
+    match verb {
+        Verb::Doctor(args) => args.run(library, printer),
+        Verb::Completions(args) => args.run(printer),
+        Verb::Man(args) => args.run(printer),
+    }
+}

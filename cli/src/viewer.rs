@@ -1,0 +1,91 @@
+//! The rerun viewer, a program of its own.
+
+use crate::failure::{Failure, Outcome};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+/// Version of the recordings that we write. Viewers read those of their own version best.
+pub const VERSION: &str = "0.36.3";
+
+pub struct Viewer {
+    path: PathBuf,
+    /// As it states it; `None` where it states none.
+    pub version: Option<String>,
+}
+
+impl Viewer {
+    /// The `rerun` program on the search path.
+    pub fn find() -> Option<Self> {
+        let program = format!("rerun{}", std::env::consts::EXE_SUFFIX);
+        let path = std::env::split_paths(&std::env::var_os("PATH")?)
+            .map(|folder| folder.join(&program))
+            .find(|path| path.is_file())?;
+        let version = stated_version(&path);
+        Some(Self { path, version })
+    }
+
+    /// The viewer, or a failure that says what to do without one.
+    pub fn require() -> Outcome<Self> {
+        Self::find().ok_or_else(|| {
+            Failure::work(format!(
+                "the rerun viewer is not installed: {}, or write the recording to a file with `--save out.rrd`",
+                install()
+            ))
+        })
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub fn fits(&self) -> bool {
+        self.version.as_deref() == Some(VERSION)
+    }
+
+    /// Opens a recording in a window that stays when we are gone.
+    pub fn open(&self, recording: &Path) -> Outcome {
+        self.command()
+            .arg(recording)
+            .spawn()
+            .map_err(|e| self.broken(e))?;
+        Ok(())
+    }
+
+    /// Serves a recording to browsers until it is stopped.
+    pub fn serve(&self, recording: &Path) -> Outcome<Child> {
+        let mut command = self.command();
+        command.arg("--serve-web").arg(recording);
+        command.stdout(Stdio::inherit()).stderr(Stdio::inherit());
+        command.spawn().map_err(|e| self.broken(e))
+    }
+
+    fn command(&self) -> Command {
+        let mut command = Command::new(&self.path);
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        command
+    }
+
+    fn broken(&self, cause: std::io::Error) -> Failure {
+        Failure::work(format!("cannot start `{}`: {cause}", self.path.display()))
+    }
+}
+
+/// How to get the viewer.
+pub fn install() -> String {
+    format!(
+        "install it with `pip install rerun-sdk=={VERSION}` or `cargo install rerun-cli --version {VERSION}`"
+    )
+}
+
+/// From the first line of `rerun --version`, e.g. `rerun-cli 0.36.3 (…)`.
+fn stated_version(path: &Path) -> Option<String> {
+    let output = Command::new(path).arg("--version").output().ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let mut words = text.split_whitespace();
+    words
+        .find(|word| word.starts_with(|c: char| c.is_ascii_digit()))
+        .map(str::to_string)
+}
