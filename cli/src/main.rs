@@ -4,6 +4,7 @@ mod args;
 mod failure;
 mod output;
 mod printer;
+mod recording;
 mod verbs;
 mod viewer;
 

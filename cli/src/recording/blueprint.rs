@@ -1,0 +1,247 @@
+//! How the viewer lays a recording out. The SDK's own builder can't set a view's eye, grid or legend, so the
+//! blueprint is logged piece by piece here.
+
+use super::write::{APPLICATION, TIMELINE};
+use super::{Recording, look};
+use nalgebra::{Rotation3, Vector3};
+use rerun::datatypes::Uuid;
+use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg, RecordingId};
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
+    ScalarAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+};
+use rerun::external::re_sdk_types::blueprint::components::{
+    BackgroundKind, ContainerKind, Corner2D, Fps, IncludedContent, LoopMode, PanelState, PlayState,
+    RootContainer, TimelineName, ViewClass,
+};
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
+
+/// Travel beyond which the eye follows the character, metres.
+const FOLLOW_BEYOND: f64 = 3.0;
+
+/// Sends the layout before the data, and makes it the one that opens.
+pub fn send(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {
+    let (layout, storage) = RecordingStreamBuilder::new(APPLICATION)
+        .recording_id(RecordingId::random())
+        .blueprint()
+        .memory()?;
+    layout.set_time_sequence("blueprint", 0);
+    log(&Layout(&layout), shown)?;
+    let messages = storage.take();
+    let blueprint_id = messages.iter().find_map(|message| match message {
+        LogMsg::SetStoreInfo(info) => Some(info.info.store_id.clone()),
+        _ => None,
+    });
+    if let Some(blueprint_id) = blueprint_id {
+        let activation = BlueprintActivationCommand {
+            blueprint_id,
+            make_active: true,
+            make_default: true,
+        };
+        stream.send_blueprint(messages, activation);
+    }
+    Ok(())
+}
+
+fn log(layout: &Layout, shown: &Recording) -> RecordingStreamResult<()> {
+    let scene = scene(layout, shown)?;
+    let mut plots = Vec::new();
+    if !shown.rewards.is_empty() {
+        plots.push((
+            plot(layout, 2, "reward terms", "plots/rewards", Some([0.0, 1.0]))?,
+            3.0,
+        ));
+    }
+    plots.push((states(layout, 3, "ground contact", "plots/contacts")?, 2.0));
+    plots.push((
+        plot(
+            layout,
+            4,
+            "height of the centre of mass, m",
+            "plots/com_height",
+            None,
+        )?,
+        2.0,
+    ));
+    plots.push((
+        plot(
+            layout,
+            5,
+            "angular momentum, kg·m²/s",
+            "plots/angular_momentum",
+            None,
+        )?,
+        2.0,
+    ));
+    plots.push((
+        plot(layout, 6, "phase", "plots/phase", Some([0.0, 1.0]))?,
+        1.2,
+    ));
+    let (views, shares): (Vec<_>, Vec<_>) = plots.into_iter().unzip();
+    let side = layout.container(100, ContainerKind::Vertical, &views, |c| {
+        c.with_row_shares(shares)
+    })?;
+    let root = [scene, side];
+    layout.container(101, ContainerKind::Horizontal, &root, |c| {
+        c.with_col_shares([2.6_f32, 1.0])
+    })?;
+    layout.viewport(101)?;
+    layout.panels(shown.fps)
+}
+
+fn scene(layout: &Layout, shown: &Recording) -> RecordingStreamResult<String> {
+    let view = layout.view(1, "3D", &shown.name, "world")?;
+    let background =
+        Background::new(BackgroundKind::SolidColor).with_color(look::color(look::BACKGROUND));
+    layout.property(&view, "Background", &background)?;
+    let grid = LineGrid3D::new()
+        .with_visible(true)
+        .with_spacing(0.5)
+        .with_stroke_width(1.0);
+    layout.property(
+        &view,
+        "LineGrid3D",
+        &grid.with_color(look::color(look::GRID)),
+    )?;
+    layout.property(&view, "EyeControls3D", &eye(shown))?;
+    Ok(view)
+}
+
+/// From the front left, far enough to see the whole motion, or following a character that travels far.
+fn eye(shown: &Recording) -> EyeControls3D {
+    let lead = shown.actors().next().map(|(_, actor)| actor);
+    let com = lead.map_or(&[][..], |actor| &actor.com);
+    let start = com.first().copied().unwrap_or(Vector3::z());
+    let (low, high) = com
+        .iter()
+        .fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));
+    let follows = (high - low).xy().norm() > FOLLOW_BEYOND;
+    let aside = Vector3::new(0.0, shown.beside / 2.0, 0.0);
+    let middle = aside + if follows { start } else { (low + high) / 2.0 };
+    let width = if follows {
+        0.0
+    } else {
+        (high - low).xy().norm()
+    };
+    let distance = 3.0 + 0.9 * width + 0.8 * shown.beside;
+    let direction = Rotation3::from_euler_angles(0.0, -0.22, 0.85) * Vector3::x();
+    let target = Vector3::new(middle.x, middle.y, middle.z.max(0.6) - 0.1);
+    let place = target + direction * distance;
+    let eye = EyeControls3D::new()
+        .with_position(place.map(|c| c as f32).data.0[0])
+        .with_look_target(target.map(|c| c as f32).data.0[0])
+        .with_eye_up([0.0, 0.0, 1.0]);
+    if follows {
+        let branch = if shown.agent.is_some() {
+            "agent"
+        } else {
+            "reference"
+        };
+        return eye.with_tracking_entity(format!("/world/{branch}/com"));
+    }
+    eye
+}
+
+fn plot(
+    layout: &Layout,
+    number: u8,
+    name: &str,
+    origin: &str,
+    range: Option<[f64; 2]>,
+) -> RecordingStreamResult<String> {
+    let view = layout.view(number, "TimeSeries", name, origin)?;
+    let legend = PlotLegend::new().with_corner(Corner2D::RightTop);
+    layout.property(&view, "PlotLegend", &legend)?;
+    if let Some([low, high]) = range {
+        let room = 0.05 * (high - low);
+        let axis = ScalarAxis::new().with_range([low - room, high + room]);
+        layout.property(&view, "ScalarAxis", &axis)?;
+    }
+    Ok(view)
+}
+
+fn states(layout: &Layout, number: u8, name: &str, origin: &str) -> RecordingStreamResult<String> {
+    layout.view(number, "StateTimeline", name, origin)
+}
+
+/// The blueprint's store.
+struct Layout<'a>(&'a RecordingStream);
+
+impl Layout<'_> {
+    /// A view and what it shows; gives its path.
+    fn view(
+        &self,
+        number: u8,
+        class: &str,
+        name: &str,
+        origin: &str,
+    ) -> RecordingStreamResult<String> {
+        let path = format!("view/{}", hyphenated(number));
+        let blueprint = ViewBlueprint::new(ViewClass(class.into()))
+            .with_display_name(name)
+            .with_space_origin(format!("/{origin}"));
+        self.0.log(path.as_str(), &blueprint)?;
+        self.0.log(
+            format!("{path}/ViewContents"),
+            &ViewContents::new(["$origin/**"]),
+        )?;
+        Ok(path)
+    }
+
+    fn property(
+        &self,
+        view: &str,
+        name: &str,
+        property: &impl AsComponents,
+    ) -> RecordingStreamResult<()> {
+        self.0.log(format!("{view}/{name}"), property)
+    }
+
+    fn container(
+        &self,
+        number: u8,
+        kind: ContainerKind,
+        contents: &[String],
+        share: impl FnOnce(ContainerBlueprint) -> ContainerBlueprint,
+    ) -> RecordingStreamResult<String> {
+        let path = format!("container/{}", hyphenated(number));
+        let contents = contents
+            .iter()
+            .map(|path| IncludedContent(path.as_str().into()));
+        let blueprint = share(ContainerBlueprint::new(kind).with_contents(contents));
+        self.0.log(path.as_str(), &blueprint)?;
+        Ok(path)
+    }
+
+    fn viewport(&self, root: u8) -> RecordingStreamResult<()> {
+        let viewport = ViewportBlueprint::new()
+            .with_root_container(RootContainer(uuid(root)))
+            .with_auto_layout(false)
+            .with_auto_views(false);
+        self.0.log("viewport", &viewport)
+    }
+
+    fn panels(&self, fps: f64) -> RecordingStreamResult<()> {
+        let collapsed = PanelBlueprint::new().with_state(PanelState::Collapsed);
+        self.0.log("blueprint_panel", &collapsed)?;
+        self.0.log("selection_panel", &collapsed)?;
+        let time = TimePanelBlueprint::new()
+            .with_state(PanelState::Collapsed)
+            .with_timeline(TimelineName(TIMELINE.into()))
+            .with_fps(Fps(fps.into()))
+            .with_play_state(PlayState::Playing)
+            .with_loop_mode(LoopMode::All);
+        self.0.log("time_panel", &time)
+    }
+}
+
+fn uuid(number: u8) -> Uuid {
+    let mut bytes = [0; 16];
+    bytes[15] = number;
+    Uuid { bytes }
+}
+
+/// As the viewer spells the same identifier in a path.
+fn hyphenated(number: u8) -> String {
+    format!("00000000-0000-0000-0000-{number:012x}")
+}

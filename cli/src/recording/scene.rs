@@ -1,0 +1,220 @@
+//! The three-dimensional part: bodies, centre of mass, angular momentum, contacts.
+
+use super::look::{self, Rgba};
+use super::{Actor, Part, Recording, Side};
+use mimic::skeleton::Shape;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rerun::{
+    Arrows3D, Boxes3D, Capsules3D, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Quaternion,
+    RecordingStream, RecordingStreamResult, TimeColumn, Transform3D, ViewCoordinates,
+};
+
+/// Length of the longest angular momentum arrow, metres.
+const LONGEST_ARROW: f64 = 0.7;
+/// Angular momentum that is drawn that long at least, kg·m²/s: a still character shows no big arrows.
+const LEAST_MOMENTUM: f64 = 3.0;
+
+/// Logs everything below `world`.
+pub fn log(
+    stream: &RecordingStream,
+    shown: &Recording,
+    times: &[TimeColumn],
+) -> RecordingStreamResult<()> {
+    stream.log_static("world", &ViewCoordinates::RIGHT_HAND_Z_UP())?;
+    let per_meter = arrow_scale(shown);
+    for (name, actor) in shown.actors() {
+        let branch = format!("world/{name}");
+        let lead = shown.agent.is_none() || name == "agent";
+        if name == "reference" {
+            let aside = [0.0, shown.beside as f32, 0.0];
+            stream.log_static(branch.as_str(), &Transform3D::from_translation(aside))?;
+        }
+        bodies(stream, &branch, shown, actor, lead, times)?;
+        momentum(stream, &branch, name, actor, per_meter, times)?;
+        contacts(stream, &branch, name, shown, actor, times)?;
+    }
+    trail(stream, shown)
+}
+
+fn bodies(
+    stream: &RecordingStream,
+    branch: &str,
+    shown: &Recording,
+    actor: &Actor,
+    lead: bool,
+    times: &[TimeColumn],
+) -> RecordingStreamResult<()> {
+    for (index, part) in shown.parts.iter().enumerate() {
+        let path = format!("{branch}/bodies/{}", part.name);
+        shapes(stream, &path, part, lead)?;
+        let poses = actor.poses.iter().filter_map(|frame| frame.get(index));
+        let (places, turns): (Vec<_>, Vec<_>) = poses.map(place_and_turn).unzip();
+        let moves = Transform3D::update_fields()
+            .with_many_translation(places)
+            .with_many_quaternion(turns);
+        stream.send_columns(path, times.to_vec(), moves.columns_of_unit_batches()?)?;
+    }
+    Ok(())
+}
+
+/// A body's shapes don't change; only its transform does.
+fn shapes(
+    stream: &RecordingStream,
+    path: &str,
+    part: &Part,
+    lead: bool,
+) -> RecordingStreamResult<()> {
+    let dress: fn(Side) -> Rgba = if lead { look::solid } else { look::ghost };
+    let color = look::color(dress(part.side));
+    let mut balls = (Vec::new(), Vec::new());
+    let mut rods = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut boxes = (Vec::new(), Vec::new(), Vec::new());
+    for shape in &part.shapes {
+        match shape {
+            Shape::Sphere { center, radius } => {
+                balls.0.push(vec3(center));
+                balls.1.push(*radius as f32);
+            }
+            Shape::Capsule { a, b, radius } => {
+                let (place, turn) = place_and_turn(&along(a, b));
+                rods.0.push((b - a).norm() as f32);
+                rods.1.push(*radius as f32);
+                rods.2.push(place);
+                rods.3.push(turn);
+            }
+            Shape::Box { pose, half } => {
+                let (place, turn) = place_and_turn(pose);
+                boxes.0.push(place);
+                boxes.1.push(vec3(half));
+                boxes.2.push(turn);
+            }
+        }
+    }
+    if !balls.0.is_empty() {
+        let balls = Ellipsoids3D::from_centers_and_radii(balls.0, balls.1);
+        let balls = balls.with_colors([color]).with_fill_mode(FillMode::Solid);
+        stream.log_static(path, &balls)?;
+    }
+    if !rods.0.is_empty() {
+        let rods = Capsules3D::from_lengths_and_radii(rods.0, rods.1)
+            .with_translations(rods.2)
+            .with_quaternions(rods.3);
+        let rods = rods.with_colors([color]).with_fill_mode(FillMode::Solid);
+        stream.log_static(path, &rods)?;
+    }
+    if !boxes.0.is_empty() {
+        let boxes =
+            Boxes3D::from_centers_and_half_sizes(boxes.0, boxes.1).with_quaternions(boxes.2);
+        let boxes = boxes.with_colors([color]).with_fill_mode(FillMode::Solid);
+        stream.log_static(path, &boxes)?;
+    }
+    Ok(())
+}
+
+fn momentum(
+    stream: &RecordingStream,
+    branch: &str,
+    name: &str,
+    actor: &Actor,
+    per_meter: f64,
+    times: &[TimeColumn],
+) -> RecordingStreamResult<()> {
+    let color = look::color(look::of_actor(name));
+    let path = format!("{branch}/com");
+    stream.log_static(
+        path.as_str(),
+        &Points3D::update_fields()
+            .with_colors([color])
+            .with_radii([0.025]),
+    )?;
+    let com = actor.com.iter().map(vec3);
+    let points = Points3D::update_fields().with_positions(com.clone());
+    stream.send_columns(path, times.to_vec(), points.columns_of_unit_batches()?)?;
+
+    let path = format!("{branch}/angular_momentum");
+    stream.log_static(
+        path.as_str(),
+        &Arrows3D::update_fields()
+            .with_colors([color])
+            .with_radii([0.012]),
+    )?;
+    let arrows = Arrows3D::update_fields().with_origins(com).with_vectors(
+        actor
+            .angular_momentum
+            .iter()
+            .map(|l| vec3(&(l / per_meter))),
+    );
+    stream.send_columns(path, times.to_vec(), arrows.columns_of_unit_batches()?)
+}
+
+/// A dot on the ground below every body that touches it.
+fn contacts(
+    stream: &RecordingStream,
+    branch: &str,
+    name: &str,
+    shown: &Recording,
+    actor: &Actor,
+    times: &[TimeColumn],
+) -> RecordingStreamResult<()> {
+    let mut dots = Vec::new();
+    let mut lengths = Vec::with_capacity(actor.contact.len());
+    for (poses, touching) in actor.poses.iter().zip(&actor.contact) {
+        let before = dots.len();
+        for (part, _) in shown
+            .contact_parts
+            .iter()
+            .zip(touching)
+            .filter(|(_, t)| **t)
+        {
+            let place = poses.get(*part).map(|pose| pose.translation.vector);
+            dots.extend(place.map(|p| [p.x as f32, p.y as f32, 0.005]));
+        }
+        lengths.push(dots.len() - before);
+    }
+    let path = format!("{branch}/contacts");
+    let style = Points3D::update_fields()
+        .with_colors([look::color(look::of_actor(name))])
+        .with_radii([0.04]);
+    stream.log_static(path.as_str(), &style)?;
+    let dots = Points3D::update_fields()
+        .with_positions(dots)
+        .columns(lengths)?;
+    stream.send_columns(path, times.to_vec(), dots)
+}
+
+/// The way of the reference's centre of mass.
+fn trail(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {
+    let way: Vec<_> = shown.reference.com.iter().map(vec3).collect();
+    let line = LineStrips3D::new([way])
+        .with_colors([look::color(look::TRAIL)])
+        .with_radii([0.004]);
+    stream.log_static("world/reference/com_trail", &line)
+}
+
+/// Angular momentum that is drawn as an arrow of one metre, the same for all characters.
+fn arrow_scale(shown: &Recording) -> f64 {
+    let momenta = shown
+        .actors()
+        .flat_map(|(_, actor)| &actor.angular_momentum);
+    let largest = momenta.map(|l| l.norm()).fold(LEAST_MOMENTUM, f64::max);
+    largest / LONGEST_ARROW
+}
+
+/// The frame at `a` whose Z axis points at `b`, in which the viewer draws a capsule.
+pub(super) fn along(a: &Vector3<f64>, b: &Vector3<f64>) -> Isometry3<f64> {
+    let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a)).unwrap_or_else(half_turn);
+    Isometry3::from_parts((*a).into(), turn)
+}
+
+fn place_and_turn(pose: &Isometry3<f64>) -> ([f32; 3], Quaternion) {
+    let q = pose.rotation.coords.map(|c| c as f32);
+    (
+        vec3(&pose.translation.vector),
+        Quaternion::from_xyzw(q.into()),
+    )
+}
+
+fn vec3(v: &Vector3<f64>) -> [f32; 3] {
+    v.map(|c| c as f32).into()
+}
