@@ -1,7 +1,10 @@
 //! The command line: what can be typed.
 
+use crate::failure::{Failure, Outcome};
 use crate::verbs;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mimic::clip::LoopMode;
+use mimic::import::{Options, UpAxis};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -9,7 +12,7 @@ Examples:
   mimic info kick.fbx               what is in the file, and which joint is which
   mimic retarget kick.fbx           carry the clip onto the physics character
   mimic train kick.fbx              learn to perform it; the result is a run, runs/kick
-  mimic replay kick --rerun         watch the agent beside its reference
+  mimic replay kick --rerun         watch the agent with its reference
   mimic eval kick                   how well it does
 
 Every stage takes the file of an earlier stage and does what is missing. Inputs are found by path, or
@@ -53,7 +56,123 @@ pub struct Talk {
 
 #[derive(Subcommand)]
 pub enum Verb {
+    Info(verbs::info::Args),
+    Import(verbs::import::Args),
     Doctor(verbs::doctor::Args),
     Completions(verbs::completions::Args),
     Man(verbs::man::Args),
+}
+
+/// How an animation file is read.
+#[derive(Args, Default)]
+#[command(next_help_heading = "Import options")]
+pub struct ImportArgs {
+    /// Take to read, by name or by number from 1 [default: the one with most motion]
+    #[arg(long, value_name = "TAKE")]
+    take: Option<String>,
+    /// Frames per second to sample at [default: the take's own]
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    fps: Option<f64>,
+    /// Part to keep, in seconds from the start of the take
+    #[arg(long, value_name = "A..B", value_parser = span)]
+    trim: Option<(f64, f64)>,
+    /// Whether the last frame leads to the first, or the motion ends
+    #[arg(long = "loop", value_enum, value_name = "MODE", default_value_t)]
+    loops: Loop,
+    /// Up axis of the data, where the file is wrong about it: x, y, z, -x, -y or -z
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    up: Option<UpAxis>,
+    /// Metres per unit of the data, where the file is wrong about it
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    unit: Option<f64>,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum Loop {
+    /// Find out from the motion
+    #[default]
+    Auto,
+    /// The last frame leads to the first
+    Wrap,
+    /// It is performed once, and then ends
+    Clamp,
+}
+
+impl ImportArgs {
+    pub fn options(&self) -> Options {
+        Options {
+            take: self.take.clone(),
+            fps: self.fps,
+            trim: self.trim,
+            loop_mode: match self.loops {
+                Loop::Auto => None,
+                Loop::Wrap => Some(LoopMode::Wrap),
+                Loop::Clamp => Some(LoopMode::Clamp),
+            },
+            up: self.up,
+            unit_m: self.unit,
+        }
+    }
+
+    pub fn take(&self) -> Option<&str> {
+        self.take.as_deref()
+    }
+
+    /// Flags that have nothing to act on once a file is a clip or a motion are refused, not ignored.
+    pub fn refuse_for(&self, file: &std::path::Path, kind: &str) -> Outcome {
+        if self.options() == Options::default() {
+            return Ok(());
+        }
+        Err(Failure::input(
+            file,
+            format!("is {kind} already, import options don't apply; give the animation file"),
+        ))
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "not a number".to_string())?;
+    if number.is_finite() && number > 0.0 {
+        Ok(number)
+    } else {
+        Err("not a positive number".into())
+    }
+}
+
+/// `A..B`, `A..` or `..B`, in seconds.
+fn span(text: &str) -> Result<(f64, f64), String> {
+    let seconds = |text: &str, open: f64| match text.trim().trim_end_matches('s') {
+        "" => Ok(open),
+        text => text
+            .parse()
+            .map_err(|_| format!("`{text}` is no number of seconds")),
+    };
+    let (from, to) = text
+        .split_once("..")
+        .ok_or("give seconds as A..B, e.g. 0.5..2")?;
+    let (from, to) = (seconds(from, 0.0)?, seconds(to, f64::INFINITY)?);
+    if from >= 0.0 && from < to {
+        Ok((from, to))
+    } else {
+        Err("the end isn't after the start".into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn spans_may_be_open() {
+        assert_eq!(span("0.5..2"), Ok((0.5, 2.0)));
+        assert_eq!(span("1.."), Ok((1.0, f64::INFINITY)));
+        assert_eq!(span("..2s"), Ok((0.0, 2.0)));
+        assert!(span("2..1").is_err() && span("nan..1").is_err() && span("1").is_err());
+    }
 }

@@ -34,12 +34,11 @@ impl Failure {
 
     /// An input error about one file. The file is named once, also where the cause names it already.
     pub fn input(path: &Path, cause: impl Display) -> Self {
-        let (cause, name) = (cause.to_string(), path.display().to_string());
-        if cause.contains(&name) {
-            Self::user(cause)
-        } else {
-            Self::user(format!("`{name}`: {cause}"))
-        }
+        let cause = cause.to_string();
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let named = [format!("{}: ", path.display()), format!("{file}: ")];
+        let bare = named.iter().find_map(|name| cause.strip_prefix(name));
+        Self::user(format!("`{}`: {}", path.display(), bare.unwrap_or(&cause)))
     }
 
     /// A file that cannot be written.
@@ -92,8 +91,10 @@ mod tests {
         let path = Path::new("a/kick.fbx");
         let plain = Failure::input(path, "truncated\n  at byte 3");
         assert_eq!(plain.message(), Some("`a/kick.fbx`: truncated at byte 3"));
-        let named = Failure::input(path, "a/kick.fbx is empty");
-        assert_eq!(named.message(), Some("a/kick.fbx is empty"));
+        for name in ["a/kick.fbx", "kick.fbx"] {
+            let named = Failure::input(path, format!("{name}: an empty file"));
+            assert_eq!(named.message(), Some("`a/kick.fbx`: an empty file"));
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod args;
 mod failure;
+mod locate;
 mod output;
 mod printer;
 mod recording;

@@ -52,7 +52,11 @@ fn log(layout: &Layout, shown: &Recording) -> RecordingStreamResult<()> {
             3.0,
         ));
     }
-    plots.push((states(layout, 3, "ground contact", "plots/contacts")?, 2.0));
+    let lanes = 0.6 + 0.45 * (shown.contact_parts.len() * shown.actors().count()) as f32;
+    plots.push((
+        states(layout, 3, "ground contact", "plots/contacts")?,
+        lanes,
+    ));
     plots.push((
         plot(
             layout,
@@ -123,7 +127,7 @@ fn eye(shown: &Recording) -> EyeControls3D {
     } else {
         (high - low).xy().norm()
     };
-    let distance = 3.0 + 0.9 * width + 0.8 * shown.beside;
+    let distance = 2.4 + 0.9 * width + 0.8 * shown.beside;
     let direction = Rotation3::from_euler_angles(0.0, -0.22, 0.85) * Vector3::x();
     let target = Vector3::new(middle.x, middle.y, middle.z.max(0.6) - 0.1);
     let place = target + direction * distance;

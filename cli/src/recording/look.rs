@@ -6,7 +6,7 @@ use rerun::Color;
 pub type Rgba = [u8; 4];
 
 pub const BACKGROUND: Rgba = [24, 26, 31, 255];
-pub const GRID: Rgba = [255, 255, 255, 28];
+pub const GRID: Rgba = [255, 255, 255, 12];
 pub const PHASE: Rgba = [190, 196, 206, 255];
 pub const AGENT: Rgba = [255, 183, 77, 255];
 pub const REFERENCE: Rgba = [129, 199, 245, 255];

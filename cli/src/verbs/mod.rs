@@ -2,6 +2,8 @@
 
 pub mod completions;
 pub mod doctor;
+pub mod import;
+pub mod info;
 pub mod man;
 
 use crate::args::Verb;
@@ -12,6 +14,8 @@ use std::path::Path;
 /// Runs one verb.
 pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
     match verb {
+        Verb::Info(args) => args.run(library, printer),
+        Verb::Import(args) => args.run(library, printer),
         Verb::Doctor(args) => args.run(library, printer),
         Verb::Completions(args) => args.run(printer),
         Verb::Man(args) => args.run(printer),

@@ -1,0 +1,153 @@
+//! `mimic import`: animation files become clips.
+
+use crate::args::ImportArgs;
+use crate::failure::{Failure, Outcome};
+use crate::locate;
+use crate::output::{make_room, names_folder, result_path};
+use crate::printer::Printer;
+use mimic::clip::{Clip, LoopMode, Problem};
+use mimic::import;
+use serde::Serialize;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic import kick.fbx                             writes kick.clip
+  mimic import pack.glb --take run --out run.clip   one take of many
+  mimic import walk.fbx --trim 0.5..1.6 --loop wrap
+  mimic import mixamo/*.fbx --out clips/            many files into a folder";
+
+/// Read animation files and write them as clips
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// FBX, glTF or DeepMimic files
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Clip to write, or a folder for many [default: NAME.clip in this folder]
+    #[arg(long, short, value_name = "PATH")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    import: ImportArgs,
+}
+
+/// One file to read and where its clip goes.
+struct Step {
+    input: PathBuf,
+    output: PathBuf,
+}
+
+#[derive(Serialize)]
+struct Report {
+    clip: String,
+    fps: f64,
+    frames: usize,
+    duration_s: f64,
+    joints: usize,
+    #[serde(rename = "loop")]
+    loop_mode: LoopMode,
+    problems: Vec<Problem>,
+}
+
+impl Args {
+    pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
+        let steps = self.plan(library)?;
+        let bar = printer.progress(steps.len() as u64, "{bar:30} {pos}/{len} {msg}");
+        let mut reports = Vec::with_capacity(steps.len());
+        for step in &steps {
+            bar.set_message(step.input.display().to_string());
+            reports.push(self.import(step, printer)?);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        match reports.as_slice() {
+            [one] => printer.result(one, || line(one)),
+            many => printer.result(&json!({ "clips": many }), || {
+                many.iter().map(line).collect::<Vec<_>>().join("\n")
+            }),
+        }
+    }
+
+    /// Everything that can be wrong with the command is found before the first file is written.
+    fn plan(&self, library: &Path) -> Outcome<Vec<Step>> {
+        if let Some(out) = self
+            .out
+            .as_deref()
+            .filter(|out| self.files.len() > 1 && !names_folder(out))
+        {
+            let out = out.display();
+            return Err(Failure::user(format!(
+                "several files can't become the one file `{out}`, name a folder: `--out {out}/`"
+            )));
+        }
+        let mut taken = BTreeMap::new();
+        let mut steps = Vec::new();
+        for file in &self.files {
+            let input = locate::file(file, library, &locate::SOURCES)?;
+            let output = result_path(self.out.as_deref(), &self.name(&input), "clip");
+            if let Some(other) = taken.insert(output.clone(), input.clone()) {
+                let (other, output) = (other.display(), output.display());
+                return Err(Failure::input(
+                    &input,
+                    format!("would become `{output}`, as would `{other}`"),
+                ));
+            }
+            steps.push(Step { input, output });
+        }
+        Ok(steps)
+    }
+
+    fn name(&self, input: &Path) -> String {
+        let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+        match self.import.take() {
+            Some(take) => format!("{stem}-{take}"),
+            None => stem.into_owned(),
+        }
+    }
+
+    fn import(&self, step: &Step, printer: &Printer) -> Outcome<Report> {
+        let Step { input, output } = step;
+        if locate::has_extension(input, "clip") {
+            return Err(Failure::input(
+                input,
+                "is a clip already, `mimic retarget` takes it as it is",
+            ));
+        }
+        let clip =
+            import::load(input, &self.import.options()).map_err(|e| Failure::input(input, e))?;
+        make_room(output, input)?;
+        clip.save(output).map_err(|e| Failure::write(output, e))?;
+        printer.problems(&clip.problems);
+        Ok(report(output, clip))
+    }
+}
+
+fn report(output: &Path, clip: Clip) -> Report {
+    Report {
+        clip: output.display().to_string(),
+        fps: clip.fps,
+        frames: clip.frames.len(),
+        duration_s: clip.duration(),
+        joints: clip.joints.len(),
+        loop_mode: clip.loop_mode,
+        problems: clip.problems,
+    }
+}
+
+fn line(report: &Report) -> String {
+    let loops = match report.loop_mode {
+        LoopMode::Wrap => "loops",
+        LoopMode::Clamp => "ends",
+    };
+    let Report {
+        clip,
+        fps,
+        frames,
+        duration_s,
+        joints,
+        ..
+    } = report;
+    format!("{clip}: {frames} frames at {fps:.1} Hz, {duration_s:.2} s, {joints} joints, {loops}")
+}

@@ -1,0 +1,192 @@
+//! `mimic info`: what is in an animation file.
+
+use crate::failure::{Failure, Outcome};
+use crate::locate;
+use crate::output::{make_room, write_whole};
+use crate::printer::Printer;
+use mimic::clip::{Clip, Joint, Problem, Severity};
+use mimic::humanoid::{self, HumanoidMap};
+use mimic::import::{self, TakeInfo};
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic info kick.fbx                          takes, joints, and which joint is which
+  mimic info kick.fbx --write-map kick.json    the joint map as a file to edit, for `retarget --map`
+  mimic info kick.clip --json                  for scripts";
+
+/// Show what is in an animation file: takes, joints, units, joint map, problems
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// FBX, glTF or DeepMimic file, or a clip
+    file: PathBuf,
+    /// Write the joint map to a file that can be edited and given to `retarget --map`
+    #[arg(long, value_name = "FILE")]
+    write_map: Option<PathBuf>,
+}
+
+/// What every kind of file has to tell.
+#[derive(Serialize)]
+struct Report {
+    file: String,
+    format: String,
+    takes: Vec<TakeInfo>,
+    joints: Vec<String>,
+    up_axis: String,
+    unit_m: f64,
+    map: Vec<Row>,
+    problems: Vec<Problem>,
+}
+
+/// One slot of the joint map.
+#[derive(Serialize)]
+pub struct Row {
+    pub slot: String,
+    pub joint: String,
+    pub confidence: f64,
+    pub reason: String,
+}
+
+impl Args {
+    pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
+        let file = locate::file(&self.file, library, &locate::CLIPS)?;
+        let (mut report, joints) = look(&file)?;
+        match humanoid::map(&joints) {
+            Ok(map) => {
+                report.map = rows(&map, &joints);
+                if let Some(path) = &self.write_map {
+                    make_room(path, &file)?;
+                    write_whole(path, map.to_json(&joints).as_bytes())?;
+                    printer.note(format!("wrote {}", path.display()));
+                }
+            }
+            Err(e) if self.write_map.is_some() => return Err(Failure::input(&file, e)),
+            Err(e) => report.problems.push(Problem {
+                id: "not-humanoid".into(),
+                severity: Severity::Warning,
+                message: e.to_string(),
+            }),
+        }
+        printer.result(&report, || text(&report))
+    }
+}
+
+fn look(file: &Path) -> Outcome<(Report, Vec<Joint>)> {
+    if locate::has_extension(file, "clip") {
+        let clip = Clip::load(file).map_err(|e| Failure::input(file, e))?;
+        return Ok(of_clip(file, clip));
+    }
+    let found = import::inspect(file).map_err(|e| Failure::input(file, e))?;
+    let report = Report {
+        file: file.display().to_string(),
+        format: found.format,
+        takes: found.takes,
+        joints: names(&found.joints),
+        up_axis: found.up_axis,
+        unit_m: found.unit_m,
+        map: Vec::new(),
+        problems: found.problems,
+    };
+    Ok((report, found.joints))
+}
+
+fn of_clip(file: &Path, clip: Clip) -> (Report, Vec<Joint>) {
+    let take = TakeInfo {
+        name: clip.source.take.clone(),
+        fps: clip.fps,
+        frames: clip.frames.len(),
+        duration_s: clip.duration(),
+    };
+    let report = Report {
+        file: file.display().to_string(),
+        format: "clip".into(),
+        takes: vec![take],
+        joints: names(&clip.joints),
+        up_axis: "+Z".into(),
+        unit_m: 1.0,
+        map: Vec::new(),
+        problems: clip.problems,
+    };
+    (report, clip.joints)
+}
+
+fn names(joints: &[Joint]) -> Vec<String> {
+    joints.iter().map(|joint| joint.name.clone()).collect()
+}
+
+/// The joint map in the order of the slots.
+pub fn rows(map: &HumanoidMap, joints: &[Joint]) -> Vec<Row> {
+    let row = |(slot, found): (&humanoid::Slot, &humanoid::Match)| {
+        Some(Row {
+            slot: slot.name().into(),
+            joint: joints.get(found.joint)?.name.clone(),
+            confidence: found.confidence,
+            reason: found.reason.clone(),
+        })
+    };
+    map.matches.iter().filter_map(row).collect()
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!(
+        "{}: {}, {} up, {} m per unit, {} joints\n",
+        report.file,
+        report.format,
+        report.up_axis,
+        report.unit_m,
+        report.joints.len()
+    );
+    section(&mut text, "takes");
+    for (index, take) in report.takes.iter().enumerate() {
+        let TakeInfo {
+            name,
+            fps,
+            frames,
+            duration_s,
+        } = take;
+        let number = index + 1;
+        line(
+            &mut text,
+            format!(
+                "{number:>3}  {name:32} {frames:>6} frames  {fps:>6.1} Hz  {duration_s:>7.2} s"
+            ),
+        );
+    }
+    section(&mut text, "joint map");
+    for Row {
+        slot,
+        joint,
+        confidence,
+        reason,
+    } in &report.map
+    {
+        let percent = 100.0 * confidence;
+        line(
+            &mut text,
+            format!("     {slot:16} {joint:32} {percent:>3.0} %  {reason}"),
+        );
+    }
+    if !report.problems.is_empty() {
+        section(&mut text, "problems");
+    }
+    for problem in &report.problems {
+        let severity = format!("{:?}", problem.severity).to_lowercase();
+        line(
+            &mut text,
+            format!("     {severity:8} {}: {}", problem.id, problem.message),
+        );
+    }
+    text
+}
+
+fn section(text: &mut String, title: &str) {
+    line(text, format!("\n{title}"));
+}
+
+/// Writing to a string can't fail.
+fn line(text: &mut String, line: String) {
+    writeln!(text, "{}", line.trim_end()).ok();
+}
