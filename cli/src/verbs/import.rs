@@ -55,19 +55,21 @@ impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let steps = self.plan(library)?;
         let bar = printer.progress(steps.len() as u64, "{bar:30} {pos}/{len} {msg}");
-        let mut reports = Vec::with_capacity(steps.len());
+        let (mut reports, mut failures) = (Vec::new(), Vec::new());
         for step in &steps {
             bar.set_message(step.input.display().to_string());
-            reports.push(self.import(step, printer)?);
+            match self.import(step, printer) {
+                Ok(report) => reports.push(report),
+                Err(failure) => failures.push(failure),
+            }
             bar.inc(1);
         }
         bar.finish_and_clear();
-        match reports.as_slice() {
-            [one] => printer.result(one, || line(one)),
-            many => printer.result(&json!({ "clips": many }), || {
-                many.iter().map(line).collect::<Vec<_>>().join("\n")
-            }),
+        if steps.len() == 1 {
+            failures.pop().map_or(Ok(()), Err)?;
         }
+        print(&reports, steps.len(), printer)?;
+        summary(failures, steps.len(), printer)
     }
 
     /// Everything that can be wrong with the command is found before the first file is written.
@@ -121,6 +123,33 @@ impl Args {
         clip.save(output).map_err(|e| Failure::write(output, e))?;
         printer.problems(&clip.problems);
         Ok(report(output, clip))
+    }
+}
+
+fn print(reports: &[Report], files: usize, printer: &Printer) -> Outcome {
+    match reports {
+        [] => Ok(()),
+        [one] if files == 1 => printer.result(one, || line(one)),
+        many => printer.result(&json!({ "clips": many }), || {
+            many.iter().map(line).collect::<Vec<_>>().join("\n")
+        }),
+    }
+}
+
+/// Ends as the worst of the files did.
+fn summary(failures: Vec<Failure>, files: usize, printer: &Printer) -> Outcome {
+    let count = failures.len();
+    for failure in &failures {
+        printer.warn(failure.message().unwrap_or_default());
+    }
+    let message = format!("{count} of {files} files could not be imported");
+    match failures
+        .into_iter()
+        .min_by_key(|f| matches!(f, Failure::User(_)))
+    {
+        None => Ok(()),
+        Some(Failure::User(_)) => Err(Failure::user(message)),
+        Some(_) => Err(Failure::work(message)),
     }
 }
 

@@ -1,0 +1,89 @@
+//! 0 success, 1 the work failed, 2 wrong usage or input.
+
+use crate::workbench::Workbench;
+
+#[test]
+fn help_and_version_succeed() {
+    let bench = Workbench::new();
+    bench.mimic(&["--help"]).assert().success();
+    bench.mimic(&["--version"]).assert().success();
+    for verb in ["info", "import", "doctor", "completions", "man"] {
+        let output = bench.mimic(&[verb, "--help"]).assert().success();
+        let text = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+        assert!(text.contains("Examples:"), "{verb} shows examples");
+    }
+}
+
+#[test]
+fn a_typo_in_a_flag_or_verb_is_wrong_usage() {
+    let bench = Workbench::with_clip();
+    for line in [
+        &["info", "sway.txt", "--jsno"][..],
+        &["imprt", "sway.txt"],
+        &["import"],
+        &["import", "sway.txt", "--fps", "fast"],
+        &["import", "sway.txt", "--trim", "2..1"],
+        &["import", "sway.txt", "--up", "w"],
+        &[],
+    ] {
+        bench.mimic(line).assert().code(2);
+    }
+}
+
+#[test]
+fn wrong_files_are_named_with_a_remedy() {
+    let bench = Workbench::with_clip();
+    let whole = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
+    bench.write("empty.fbx", b"");
+    bench.write("notes.glb", b"kick it harder\n");
+    bench.write("half.txt", &whole[..whole.len() / 2]);
+    bench.write("half.fbx", b"Kaydara FBX Binary  \0\x1a\0\xe8\x1c\0\0");
+    bench.write("half.glb", b"glTF\x02\0\0\0\xff\xff\0\0");
+    bench.write("false.clip", &[0xff; 64]);
+    for file in [
+        "empty.fbx",
+        "notes.glb",
+        "half.txt",
+        "half.fbx",
+        "half.glb",
+        "false.clip",
+    ] {
+        let said = bench.complaint(&["info", file], 2);
+        assert!(said.starts_with(&format!("error: `{file}`: ")), "{said}");
+    }
+    for file in ["empty.fbx", "notes.glb", "half.txt", "half.fbx", "half.glb"] {
+        let said = bench.complaint(&["import", file], 2);
+        assert!(said.contains(file), "{said}");
+        assert!(!bench.path(file).with_extension("clip").exists());
+    }
+}
+
+#[test]
+fn what_is_not_there_is_named() {
+    let bench = Workbench::new();
+    let said = bench.complaint(&["info", "kick.fbx"], 2);
+    assert!(said.contains("`kick.fbx`: no such file"), "{said}");
+    let said = bench.complaint(&["info", "far/kick.fbx"], 2);
+    assert!(said.contains("`far/kick.fbx`: no such file"), "{said}");
+}
+
+#[test]
+fn the_input_is_never_overwritten() {
+    let bench = Workbench::with_clip();
+    let before = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
+    for out in ["sway.txt", "./sway.txt"] {
+        let said = bench.complaint(&["import", "sway.txt", "--out", out], 2);
+        assert!(said.contains("--out"), "{said}");
+    }
+    let said = bench.complaint(&["info", "sway.txt", "--write-map", "sway.txt"], 2);
+    assert!(said.contains("is the input itself"), "{said}");
+    let after = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
+    assert_eq!(before, after);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_failed_work() {
+    let bench = Workbench::with_clip();
+    let said = bench.complaint(&["import", "sway.txt", "--out", "sway.txt/deep/a.clip"], 1);
+    assert!(said.contains("cannot write"), "{said}");
+}

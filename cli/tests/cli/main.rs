@@ -1,0 +1,6 @@
+//! The `mimic` program as its users meet it.
+
+mod exit_codes;
+mod output;
+mod stages;
+mod workbench;

@@ -1,0 +1,1 @@
+//! Any stage takes the file of an earlier one.

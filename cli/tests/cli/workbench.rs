@@ -1,0 +1,80 @@
+//! A folder with a small clip in it, and `mimic` run there.
+
+use assert_cmd::Command;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+pub struct Workbench(TempDir);
+
+impl Workbench {
+    pub fn new() -> Self {
+        Self(TempDir::new().expect("a temporary folder can be made"))
+    }
+
+    /// With `sway.txt`: somebody who stands and sways for a second.
+    pub fn with_clip() -> Self {
+        let bench = Self::new();
+        bench.write("sway.txt", sway().to_string().as_bytes());
+        bench
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.path(name), bytes).expect("a file can be written");
+    }
+
+    pub fn mimic(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::cargo_bin("mimic").expect("the program is built");
+        command
+            .current_dir(self.0.path())
+            .env_remove("MIMIC_LIBRARY")
+            .args(arguments);
+        command
+    }
+
+    /// Runs with `--json` and gives the one object it prints.
+    pub fn json(&self, arguments: &[&str]) -> Value {
+        let output = self.mimic(arguments).arg("--json").assert().success();
+        let text = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+        assert_eq!(text.trim_end().lines().count(), 1, "one line: {text}");
+        serde_json::from_str(&text).expect("the output is JSON")
+    }
+
+    /// Runs what has to fail with `code`; gives the one line it says about that.
+    pub fn complaint(&self, arguments: &[&str], code: i32) -> String {
+        let output = self.mimic(arguments).assert().code(code);
+        let output = output.get_output();
+        assert!(output.stdout.is_empty(), "nothing on standard output");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(text.lines().count(), 1, "one line: {text}");
+        text
+    }
+}
+
+/// A DeepMimic motion: per frame its duration, root position and rotation, then joint rotations.
+fn sway() -> Value {
+    let upright = [1.0, 0.0, 0.0, 0.0];
+    let frame = |f: u32| {
+        let angle = 0.1 * (f64::from(f) / 30.0 * std::f64::consts::TAU).sin();
+        let lean = [(angle / 2.0).cos(), (angle / 2.0).sin(), 0.0, 0.0];
+        let mut row = vec![1.0 / 30.0, 0.0, 0.86, 0.0];
+        row.extend(upright);
+        row.extend(lean);
+        row.extend(upright);
+        for _side in 0..2 {
+            let (knee, elbow) = (-0.1, 0.3);
+            row.extend(upright);
+            row.push(knee);
+            row.extend(upright);
+            row.extend(upright);
+            row.push(elbow);
+        }
+        row
+    };
+    let frames: Vec<Vec<f64>> = (0..=30).map(frame).collect();
+    json!({ "Loop": "wrap", "Frames": frames })
+}
