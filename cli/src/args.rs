@@ -5,7 +5,8 @@ use crate::verbs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mimic::clip::LoopMode;
 use mimic::import::{Options, UpAxis};
-use std::path::PathBuf;
+use mimic::skeleton::Skeleton;
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -58,13 +59,16 @@ pub struct Talk {
 pub enum Verb {
     Info(verbs::info::Args),
     Import(verbs::import::Args),
+    Retarget(verbs::retarget::Args),
+    Tracks(verbs::tracks::Args),
+    Replay(verbs::replay::Args),
     Doctor(verbs::doctor::Args),
     Completions(verbs::completions::Args),
     Man(verbs::man::Args),
 }
 
 /// How an animation file is read.
-#[derive(Args, Default)]
+#[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Import options")]
 pub struct ImportArgs {
     /// Take to read, by name or by number from 1 [default: the one with most motion]
@@ -119,7 +123,7 @@ impl ImportArgs {
     }
 
     /// Flags that have nothing to act on once a file is a clip or a motion are refused, not ignored.
-    pub fn refuse_for(&self, file: &std::path::Path, kind: &str) -> Outcome {
+    pub fn refuse_for(&self, file: &Path, kind: &str) -> Outcome {
         if self.options() == Options::default() {
             return Ok(());
         }
@@ -127,6 +131,25 @@ impl ImportArgs {
             file,
             format!("is {kind} already, import options don't apply; give the animation file"),
         ))
+    }
+}
+
+/// How a clip is carried onto a physics character.
+#[derive(Args, Clone, Default)]
+#[command(next_help_heading = "Retarget options")]
+pub struct RetargetArgs {
+    /// Physics character: a built-in name, or an MJCF file [default: humanoid]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub skeleton: Option<String>,
+    /// Joint map, as `mimic info --write-map` writes it [default: found out]
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
+}
+
+impl RetargetArgs {
+    pub fn skeleton(&self) -> Outcome<Skeleton> {
+        let name = self.skeleton.as_deref().unwrap_or("humanoid");
+        Skeleton::load(name).map_err(|e| Failure::input(Path::new(name), e))
     }
 }
 

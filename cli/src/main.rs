@@ -4,6 +4,8 @@ mod args;
 mod failure;
 mod locate;
 mod output;
+mod plot;
+mod prepare;
 mod printer;
 mod recording;
 mod verbs;

@@ -1,8 +1,10 @@
 //! The rerun viewer, a program of its own.
 
 use crate::failure::{Failure, Outcome};
+use rerun::SpawnOptions;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 /// Version of the recordings that we write. Viewers read those of their own version best.
 pub const VERSION: &str = "0.36.3";
@@ -42,34 +44,40 @@ impl Viewer {
         self.version.as_deref() == Some(VERSION)
     }
 
-    /// Opens a recording in a window that stays when we are gone.
-    pub fn open(&self, recording: &Path) -> Outcome {
-        self.command()
-            .arg(recording)
-            .spawn()
-            .map_err(|e| self.broken(e))?;
-        Ok(())
+    /// Opens a window that stays when we are gone, or finds the one that is open; gives its address.
+    pub fn open(&self) -> Outcome<String> {
+        let options = SpawnOptions {
+            executable_path: Some(self.path.display().to_string()),
+            wait_for_bind: true,
+            hide_welcome_screen: true,
+            ..SpawnOptions::default()
+        };
+        let viewer = rerun::spawn(&options).map_err(|e| self.broken(e))?;
+        Ok(address(&format!("127.0.0.1:{}", viewer.port)))
     }
 
     /// Serves a recording to browsers until it is stopped.
-    pub fn serve(&self, recording: &Path) -> Outcome<Child> {
-        let mut command = self.command();
-        command.arg("--serve-web").arg(recording);
-        command.stdout(Stdio::inherit()).stderr(Stdio::inherit());
-        command.spawn().map_err(|e| self.broken(e))
-    }
-
-    fn command(&self) -> Command {
+    pub fn serve(&self, recording: &Path) -> Outcome {
         let mut command = Command::new(&self.path);
         command
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
-        command
+            .arg("--serve-web")
+            .arg(recording)
+            .stdin(Stdio::null());
+        command.status().map_err(|e| self.broken(e))?;
+        Ok(())
     }
 
-    fn broken(&self, cause: std::io::Error) -> Failure {
+    fn broken(&self, cause: impl Display) -> Failure {
         Failure::work(format!("cannot start `{}`: {cause}", self.path.display()))
+    }
+}
+
+/// Address of a viewer that listens at `host:port`, unless it is a whole address already.
+pub fn address(place: &str) -> String {
+    if place.contains("://") {
+        place.to_string()
+    } else {
+        format!("rerun+http://{place}/proxy")
     }
 }
 

@@ -5,6 +5,9 @@ pub mod doctor;
 pub mod import;
 pub mod info;
 pub mod man;
+pub mod replay;
+pub mod retarget;
+pub mod tracks;
 
 use crate::args::Verb;
 use crate::failure::Outcome;
@@ -16,6 +19,9 @@ pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
     match verb {
         Verb::Info(args) => args.run(library, printer),
         Verb::Import(args) => args.run(library, printer),
+        Verb::Retarget(args) => args.run(library, printer),
+        Verb::Tracks(args) => args.run(library, printer),
+        Verb::Replay(args) => args.run(library, printer),
         Verb::Doctor(args) => args.run(library, printer),
         Verb::Completions(args) => args.run(printer),
         Verb::Man(args) => args.run(printer),

@@ -1,0 +1,291 @@
+//! A motion's tracks as a drawing (SVG).
+
+use mimic::motion::Motion;
+use std::fmt::Write;
+
+const WIDTH: f64 = 900.0;
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 150.0;
+const TOP: f64 = 48.0;
+const GAP: f64 = 34.0;
+const PANEL: f64 = 120.0;
+const LANE: f64 = 20.0;
+/// Distance of tick marks on the vertical axis, at least, in pixels.
+const TICK_ROOM: f64 = 30.0;
+
+const COLORS: [&str; 4] = ["#c8553d", "#2a7f9e", "#6a994e", "#444444"];
+
+struct Line<'a> {
+    name: &'a str,
+    color: &'a str,
+    values: Vec<f64>,
+}
+
+/// Names of the bodies that may touch the ground.
+pub fn contact_names(motion: &Motion) -> Vec<String> {
+    let name = |body: &usize| {
+        let name = motion.body_names.get(*body).cloned();
+        name.unwrap_or_else(|| format!("body {body}"))
+    };
+    motion.contact_bodies.iter().map(name).collect()
+}
+
+/// Contacts, centre of mass, momenta and what the ground can't supply, over time.
+pub fn tracks(motion: &Motion) -> String {
+    let tracks = &motion.tracks;
+    let mut sheet = Sheet::new(motion);
+    sheet.lanes(motion);
+    sheet.panel("centre of mass, m", &xyz(&tracks.com));
+    sheet.panel(
+        "velocity of the centre of mass, m/s",
+        &xyz(&tracks.com_velocity),
+    );
+    sheet.panel("angular momentum, kg·m²/s", &xyz(&tracks.angular_momentum));
+    let force = tracks
+        .root_wrench_residual
+        .iter()
+        .map(|w| w.fixed_rows::<3>(0).norm());
+    let unsupported = Line {
+        name: "size",
+        color: COLORS[3],
+        values: force.collect(),
+    };
+    sheet.panel("force that no ground contact supplies, N", &[unsupported]);
+    let phase = Line {
+        name: "phase",
+        color: COLORS[3],
+        values: tracks.phase.clone(),
+    };
+    sheet.panel("phase", &[phase]);
+    sheet.finish()
+}
+
+fn xyz(track: &[nalgebra::Vector3<f64>]) -> [Line<'static>; 3] {
+    let names = ["x forward", "y left", "z up"];
+    std::array::from_fn(|axis| Line {
+        name: names[axis],
+        color: COLORS[axis],
+        values: track.iter().map(|v| v[axis]).collect(),
+    })
+}
+
+struct Sheet {
+    body: String,
+    /// Where the next panel begins.
+    y: f64,
+    duration: f64,
+    fps: f64,
+}
+
+impl Sheet {
+    fn new(motion: &Motion) -> Self {
+        let mut sheet = Self {
+            body: String::new(),
+            y: TOP,
+            duration: motion.duration().max(1.0 / motion.fps),
+            fps: motion.fps,
+        };
+        let title = format!("{} on {}", motion.name, motion.skeleton_name);
+        sheet.text(LEFT, 24.0, "title", &title);
+        sheet
+    }
+
+    fn x(&self, frame: usize) -> f64 {
+        let share = frame as f64 / self.fps / self.duration;
+        LEFT + share.min(1.0) * (WIDTH - LEFT - RIGHT)
+    }
+
+    /// A bar for every stretch in which a body stands on the ground.
+    fn lanes(&mut self, motion: &Motion) {
+        let names = contact_names(motion);
+        self.heading("ground contact");
+        let top = self.y;
+        let rows = &motion.tracks.contact;
+        for (contact, name) in names.iter().enumerate() {
+            let y = top + LANE * contact as f64;
+            self.text(WIDTH - RIGHT + 8.0, y + 13.0, "legend", name);
+            let down: Vec<bool> = rows
+                .iter()
+                .map(|row| row.get(contact) == Some(&true))
+                .collect();
+            for (from, to) in stretches(&down) {
+                let (x, width) = (self.x(from), self.x(to) - self.x(from));
+                let color = COLORS[contact % COLORS.len()];
+                let height = LANE - 6.0;
+                self.draw(format!(
+                    r#"<rect x="{x:.1}" y="{:.1}" width="{width:.1}" height="{height}" rx="2" fill="{color}"/>"#,
+                    y + 3.0
+                ));
+            }
+        }
+        let height = LANE * names.len().max(1) as f64;
+        self.frame(height);
+        self.y = top + height + GAP;
+    }
+
+    fn panel(&mut self, heading: &str, lines: &[Line]) {
+        self.heading(heading);
+        let all = || {
+            lines
+                .iter()
+                .flat_map(|line| &line.values)
+                .copied()
+                .filter(|v| v.is_finite())
+        };
+        let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
+        let (low, high) = if high - low < 1e-9 {
+            (low, low + 1.0)
+        } else {
+            (low, high)
+        };
+        let top = self.y;
+        let height = |value: f64| top + PANEL * (high - value) / (high - low);
+        let step = tick_step(high - low);
+        let mut tick = (low / step).ceil();
+        while tick * step <= high + 1e-9 * step {
+            let (value, y) = (tick * step + 0.0, height(tick * step));
+            self.draw(format!(
+                r#"<path class="grid" d="M{LEFT} {y:.1}H{:.1}"/>"#,
+                WIDTH - RIGHT
+            ));
+            self.text(LEFT - 8.0, y + 4.0, "tick", &short(value));
+            tick += 1.0;
+        }
+        for (row, line) in lines.iter().enumerate() {
+            let mut path = String::new();
+            for (frame, value) in line
+                .values
+                .iter()
+                .enumerate()
+                .filter(|(_, v)| v.is_finite())
+            {
+                let command = if path.is_empty() { 'M' } else { 'L' };
+                write!(path, "{command}{:.1} {:.1}", self.x(frame), height(*value)).ok();
+            }
+            let color = line.color;
+            self.draw(format!(
+                r#"<path class="line" stroke="{color}" d="{path}"/>"#
+            ));
+            let y = top + 14.0 + 18.0 * row as f64;
+            let x = WIDTH - RIGHT + 8.0;
+            self.draw(format!(
+                r#"<path class="line" stroke="{color}" d="M{x} {:.1}h16"/>"#,
+                y - 4.0
+            ));
+            self.text(x + 22.0, y, "legend", line.name);
+        }
+        self.frame(PANEL);
+        self.y = top + PANEL + GAP;
+    }
+
+    fn heading(&mut self, text: &str) {
+        self.text(LEFT, self.y - 7.0, "heading", text);
+    }
+
+    fn frame(&mut self, height: f64) {
+        let (y, width) = (self.y, WIDTH - LEFT - RIGHT);
+        self.draw(format!(
+            r#"<rect class="frame" x="{LEFT}" y="{y:.1}" width="{width}" height="{height:.1}"/>"#
+        ));
+    }
+
+    fn text(&mut self, x: f64, y: f64, class: &str, text: &str) {
+        let text = text.replace('&', "&amp;").replace('<', "&lt;");
+        self.draw(format!(
+            r#"<text class="{class}" x="{x:.1}" y="{y:.1}">{text}</text>"#
+        ));
+    }
+
+    fn draw(&mut self, element: String) {
+        self.body += &element;
+        self.body.push('\n');
+    }
+
+    /// The time axis below the last panel, and the whole as a file.
+    fn finish(mut self) -> String {
+        let bottom = self.y - GAP;
+        let step = tick_step(self.duration * 2.0);
+        let mut tick = 0.0;
+        while tick * step <= self.duration + 1e-9 {
+            let x = LEFT + tick * step / self.duration * (WIDTH - LEFT - RIGHT);
+            self.draw(format!(
+                r#"<path class="grid" d="M{x:.1} {TOP}V{bottom:.1}"/>"#
+            ));
+            self.text(
+                x,
+                bottom + 18.0,
+                "time",
+                &format!("{} s", short(tick * step)),
+            );
+            tick += 1.0;
+        }
+        let height = bottom + 34.0;
+        format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0}" width="{WIDTH}" height="{height:.0}">
+<style>
+text {{ font: 12px system-ui, sans-serif; fill: #333 }}
+.title {{ font-size: 16px; font-weight: 600 }} .heading {{ font-weight: 600 }}
+.tick {{ text-anchor: end; fill: #777 }} .time {{ text-anchor: middle; fill: #777 }}
+.line {{ fill: none; stroke-width: 1.6; stroke-linejoin: round }}
+.grid {{ fill: none; stroke: #e4e4e4 }} .frame {{ fill: none; stroke: #bbb }}
+</style>
+<rect width="100%" height="100%" fill="#fff"/>
+{}</svg>
+"##,
+            self.body
+        )
+    }
+}
+
+/// First frame and the frame after the last of every run of `true`.
+fn stretches(down: &[bool]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut start = None;
+    for (frame, down) in down.iter().copied().chain([false]).enumerate() {
+        match (down, start) {
+            (true, None) => start = Some(frame),
+            (false, Some(from)) => {
+                found.push((from, frame));
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+/// 1, 2 or 5 times a power of ten, so that ticks keep their distance.
+fn tick_step(range: f64) -> f64 {
+    let least = range * TICK_ROOM / PANEL;
+    let power = 10f64.powf(least.log10().floor());
+    let step = [1.0, 2.0, 5.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|step| *step >= least);
+    step.unwrap_or(10.0 * power)
+}
+
+/// Adding nothing turns a negative zero into a plain one.
+fn short(value: f64) -> String {
+    format!("{}", (value * 1e4).round() / 1e4 + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_are_found_at_both_ends() {
+        assert_eq!(stretches(&[true, true, false, true]), [(0, 2), (3, 4)]);
+        assert_eq!(stretches(&[false, true, false]), [(1, 2)]);
+        assert!(stretches(&[]).is_empty());
+    }
+
+    #[test]
+    fn ticks_are_round_and_sparse() {
+        assert_eq!(tick_step(4.0), 1.0);
+        assert_eq!(tick_step(1.0), 0.5);
+        assert!((tick_step(0.03) - 0.01).abs() < 1e-12);
+        assert_eq!([short(-0.5), short(-0.0), short(20.0)], ["-0.5", "0", "20"]);
+    }
+}

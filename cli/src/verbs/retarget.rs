@@ -1,0 +1,93 @@
+//! `mimic retarget`: a clip becomes a motion of a physics character.
+
+use crate::args::{ImportArgs, RetargetArgs};
+use crate::failure::{Failure, Outcome};
+use crate::locate;
+use crate::output::{make_room, result_path};
+use crate::prepare::{Preparation, Prepared};
+use crate::printer::Printer;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic retarget kick.clip                          writes kick.motion
+  mimic retarget kick.fbx --out motions/            imports first
+  mimic retarget kick.fbx --map kick.json           with a map from `mimic info --write-map`, edited
+  mimic retarget kick.fbx --skeleton robot.xml      onto your own MJCF character";
+
+/// Carry a clip onto a physics character and compute its tracks
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Clip or animation file [default: the newest clip]
+    #[arg(value_name = "CLIP")]
+    clip: Option<PathBuf>,
+    /// Motion to write, or a folder for it [default: NAME.motion in this folder]
+    #[arg(long, short, value_name = "PATH")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    retarget: RetargetArgs,
+    #[command(flatten)]
+    import: ImportArgs,
+}
+
+impl Args {
+    pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
+        let file = locate::file_or_newest(self.clip.as_deref(), library, &locate::CLIPS)?;
+        let preparation = Preparation::new(file.clone(), &self.import, &self.retarget);
+        if preparation.is_motion() {
+            return Err(Failure::input(
+                &file,
+                "is retargeted already; give the clip it was made from",
+            ));
+        }
+        let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
+        make_room(&output, &file)?;
+        let start = Instant::now();
+        let Prepared { motion, .. } = preparation.run(printer)?;
+        let seconds = start.elapsed().as_secs_f64();
+        motion
+            .save(&output)
+            .map_err(|e| Failure::write(&output, e))?;
+        let frames = motion.qpos.len();
+        let mut report = json!({
+            "motion": output,
+            "frames": frames,
+            "seconds": seconds,
+            "frames_per_second": frames as f64 / seconds.max(1e-9),
+        });
+        if let (Value::Object(report), Value::Object(found)) = (&mut report, motion.report) {
+            report.extend(found);
+        }
+        printer.result(&report, || text(&report))
+    }
+}
+
+fn text(report: &Value) -> String {
+    let number = |path: &str| {
+        report
+            .pointer(path)
+            .and_then(Value::as_f64)
+            .unwrap_or_default()
+    };
+    let motion = report["motion"].as_str().unwrap_or_default();
+    format!(
+        "{motion}: {} frames in {:.2} s\n  \
+         keypoint error   mean {:.1} cm, most {:.1} cm\n  \
+         foot skate       {:.1} cm/s\n  \
+         penetration      mean {:.1} cm, most {:.1} cm\n  \
+         float            {:.1} cm\n  \
+         joint limits     {} violations",
+        report["frames"],
+        number("/seconds"),
+        100.0 * number("/keypoint_error_m/mean"),
+        100.0 * number("/keypoint_error_m/max"),
+        100.0 * number("/foot_skate_m_s"),
+        100.0 * number("/penetration_m/mean"),
+        100.0 * number("/penetration_m/max"),
+        100.0 * number("/float_m"),
+        number("/joint_limit_violations"),
+    )
+}
