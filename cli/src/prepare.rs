@@ -5,9 +5,10 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use mimic::clip::Clip;
-use mimic::humanoid::{self, HumanoidMap};
+use mimic::humanoid::HumanoidMap;
 use mimic::import;
 use mimic::motion::Motion;
+use mimic::retarget;
 use mimic::skeleton::Skeleton;
 use std::path::PathBuf;
 
@@ -15,6 +16,8 @@ use std::path::PathBuf;
 pub struct Prepared {
     pub motion: Motion,
     pub skeleton: Skeleton,
+    /// How long retargeting took; `None` for a motion that was made before.
+    pub seconds: Option<f64>,
 }
 
 /// How a file becomes a motion.
@@ -60,10 +63,16 @@ impl Preparation {
             self.file.display(),
             skeleton.name
         ));
-        let mut motion =
-            retarget(&clip, &skeleton, &map).map_err(|e| Failure::input(&self.file, e))?;
+        let options = retarget::Options { map };
+        let done = retarget::retarget(&clip, &skeleton, &options)
+            .map_err(|e| Failure::input(&self.file, e))?;
+        let (mut motion, seconds) = (done.motion, Some(done.seconds));
         motion.name = self.name();
-        Ok(Prepared { motion, skeleton })
+        Ok(Prepared {
+            motion,
+            skeleton,
+            seconds,
+        })
     }
 
     fn load(&self, printer: &Printer) -> Outcome<Prepared> {
@@ -80,7 +89,11 @@ impl Preparation {
             .check_skeleton(&skeleton)
             .map_err(|e| Failure::input(&self.file, e))?;
         printer.detail(format!("read `{}`", self.file.display()));
-        Ok(Prepared { motion, skeleton })
+        Ok(Prepared {
+            motion,
+            skeleton,
+            seconds: None,
+        })
     }
 
     /// The skeleton a motion names, unless another file is given for it.
@@ -106,15 +119,13 @@ impl Preparation {
         import::load(file, &self.import.options()).map_err(|e| Failure::input(file, e))
     }
 
-    fn map(&self, clip: &Clip) -> Outcome<HumanoidMap> {
+    fn map(&self, clip: &Clip) -> Outcome<Option<HumanoidMap>> {
         let Some(path) = &self.retarget.map else {
-            return humanoid::map(&clip.joints).map_err(|e| Failure::input(&self.file, e));
+            return Ok(None);
         };
         let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, e))?;
-        HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::input(path, e))
+        let map =
+            HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::input(path, e))?;
+        Ok(Some(map))
     }
-}
-
-fn retarget(_: &Clip, _: &Skeleton, _: &HumanoidMap) -> Result<Motion, String> {
-    Err("to come".into())
 }

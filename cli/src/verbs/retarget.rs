@@ -8,7 +8,6 @@ use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -45,9 +44,8 @@ impl Args {
         }
         let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
         make_room(&output, &file)?;
-        let start = Instant::now();
-        let Prepared { motion, .. } = preparation.run(printer)?;
-        let seconds = start.elapsed().as_secs_f64();
+        let Prepared { motion, seconds, .. } = preparation.run(printer)?;
+        let seconds = seconds.unwrap_or_default();
         motion
             .save(&output)
             .map_err(|e| Failure::write(&output, e))?;
