@@ -41,21 +41,21 @@ pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathB
     Err(absent(wanted, library, extensions))
 }
 
-/// The file that `wanted` means; left out, the newest with the first of `extensions` that has any.
+/// The file that `wanted` means; left out, the newest `.newest` file here or in the library: one of our own
+/// kinds, never just any text that lies about.
 pub fn file_or_newest(
     wanted: Option<&Path>,
     library: &Path,
     extensions: &[&str],
+    newest: &str,
 ) -> Outcome<PathBuf> {
     if let Some(wanted) = wanted {
         return file(wanted, library, extensions);
     }
-    let newest = |extension: &&str| newest_file(&[Path::new("."), library], extension);
-    extensions.iter().find_map(newest).ok_or_else(|| {
-        let kinds = extensions.join(", .");
+    newest_file(&[Path::new("."), library], newest).ok_or_else(|| {
+        let library = library.display();
         Failure::user(format!(
-            "no file given, and none to be found here or in `{}` (looked for .{kinds})",
-            library.display()
+            "no file given, and no .{newest} here or in the library `{library}`"
         ))
     })
 }

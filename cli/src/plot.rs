@@ -6,7 +6,7 @@ use std::fmt::Write;
 const WIDTH: f64 = 900.0;
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = 150.0;
-const TOP: f64 = 48.0;
+const TOP: f64 = 62.0;
 const GAP: f64 = 34.0;
 const PANEL: f64 = 120.0;
 const LANE: f64 = 20.0;
@@ -204,7 +204,7 @@ impl Sheet {
     /// The time axis below the last panel, and the whole as a file.
     fn finish(mut self) -> String {
         let bottom = self.y - GAP;
-        let step = tick_step(self.duration * 2.0);
+        let step = tick_step(self.duration / 2.5);
         let mut tick = 0.0;
         while tick * step <= self.duration + 1e-9 {
             let x = LEFT + tick * step / self.duration * (WIDTH - LEFT - RIGHT);

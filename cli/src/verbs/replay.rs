@@ -62,7 +62,8 @@ impl Args {
         let viewer = (self.sinks.rerun || self.sinks.serve)
             .then(Viewer::require)
             .transpose()?;
-        let source = locate::file_or_newest(self.what.as_deref(), library, &locate::ANIMATIONS)?;
+        let source =
+            locate::file_or_newest(self.what.as_deref(), library, &locate::ANIMATIONS, "motion")?;
         let preparation = Preparation::new(source.clone(), &self.import, &self.retarget);
         let prepared = preparation.run(printer)?;
         let mut shown = Recording::of_motion(&prepared.motion, &prepared.skeleton);

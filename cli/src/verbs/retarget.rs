@@ -34,7 +34,7 @@ pub struct Args {
 
 impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
-        let file = locate::file_or_newest(self.clip.as_deref(), library, &locate::CLIPS)?;
+        let file = locate::file_or_newest(self.clip.as_deref(), library, &locate::CLIPS, "clip")?;
         let preparation = Preparation::new(file.clone(), &self.import, &self.retarget);
         if preparation.is_motion() {
             return Err(Failure::input(
@@ -44,7 +44,9 @@ impl Args {
         }
         let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
         make_room(&output, &file)?;
-        let Prepared { motion, seconds, .. } = preparation.run(printer)?;
+        let Prepared {
+            motion, seconds, ..
+        } = preparation.run(printer)?;
         let seconds = seconds.unwrap_or_default();
         motion
             .save(&output)

@@ -75,7 +75,12 @@ struct Report {
 
 impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
-        let file = locate::file_or_newest(self.motion.as_deref(), library, &locate::ANIMATIONS)?;
+        let file = locate::file_or_newest(
+            self.motion.as_deref(),
+            library,
+            &locate::ANIMATIONS,
+            "motion",
+        )?;
         let preparation = Preparation::new(file, &self.import, &self.retarget);
         let Prepared { motion, .. } = preparation.run(printer)?;
         if let Some(path) = &self.plot {
@@ -207,15 +212,15 @@ fn table(motion: &Motion) -> String {
     );
     let mut text = header.join(",") + "\n";
     for frame in 0..motion.qpos.len() {
-        let mut row = vec![frame.to_string(), (frame as f64 / motion.fps).to_string()];
-        row.extend(tracks.phase.get(frame).map(f64::to_string));
+        let mut row = vec![frame.to_string(), number(&(frame as f64 / motion.fps))];
+        row.extend(tracks.phase.get(frame).map(number));
         for track in [
             &tracks.com,
             &tracks.com_velocity,
             &tracks.linear_momentum,
             &tracks.angular_momentum,
         ] {
-            row.extend(track.get(frame).into_iter().flatten().map(f64::to_string));
+            row.extend(track.get(frame).into_iter().flatten().map(number));
         }
         row.extend(
             tracks
@@ -223,7 +228,7 @@ fn table(motion: &Motion) -> String {
                 .get(frame)
                 .into_iter()
                 .flatten()
-                .map(f64::to_string),
+                .map(number),
         );
         row.extend(
             tracks
@@ -236,4 +241,9 @@ fn table(motion: &Motion) -> String {
         text += &(row.join(",") + "\n");
     }
     text
+}
+
+/// To the micrometre and below anything that matters; without negative zeros.
+fn number(value: &f64) -> String {
+    format!("{:.6}", (value * 1e6).round() / 1e6 + 0.0)
 }

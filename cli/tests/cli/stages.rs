@@ -1,1 +1,185 @@
-//! Any stage takes the file of an earlier one.
+//! Any stage takes the file of an earlier one and does what is missing.
+
+use crate::workbench::Workbench;
+use serde_json::Value;
+
+#[test]
+fn retarget_has_the_fields_that_scripts_rely_on() {
+    let bench = Workbench::with_clip();
+    let report = bench.json(&["retarget", "sway.txt"]);
+    assert_eq!(report["motion"], "sway.motion");
+    assert_eq!(report["frames"], 31);
+    for path in [
+        "/seconds",
+        "/frames_per_second",
+        "/keypoint_error_m/mean",
+        "/keypoint_error_m/max",
+        "/foot_skate_m_s",
+        "/penetration_m/mean",
+        "/penetration_m/max",
+        "/float_m",
+        "/joint_limit_violations",
+    ] {
+        assert!(report.pointer(path).is_some_and(Value::is_number), "{path}");
+    }
+    assert!(report["map"].as_array().is_some_and(|map| map.len() >= 12));
+    assert!(report["problems"].is_array());
+    assert!(bench.path("sway.motion").exists());
+}
+
+#[test]
+fn every_way_to_a_motion_leads_to_the_same_motion() {
+    let bench = Workbench::with_clip();
+    bench.mimic(&["import", "sway.txt"]).assert().success();
+    bench
+        .mimic(&["retarget", "sway.clip", "--out", "by-clip/"])
+        .assert()
+        .success();
+    bench
+        .mimic(&["retarget", "sway.txt", "--out", "direct/"])
+        .assert()
+        .success();
+    bench
+        .mimic(&["info", "sway.txt", "--write-map", "map.json"])
+        .assert()
+        .success();
+    bench
+        .mimic(&[
+            "retarget", "sway.txt", "--map", "map.json", "--out", "mapped/",
+        ])
+        .assert()
+        .success();
+    let momentum = |folder: &str| {
+        bench.json(&["tracks", &format!("{folder}/sway.motion")])["linear_momentum"]["max"].as_f64()
+    };
+    let (direct, by_clip) = (
+        momentum("direct").unwrap_or(0.0),
+        momentum("by-clip").unwrap_or(1.0),
+    );
+    assert!(
+        (direct - by_clip).abs() < 1e-4 * direct,
+        "a clip file holds f32: {direct} {by_clip}"
+    );
+    let read = |folder: &str| std::fs::read(bench.path(&format!("{folder}/sway.motion"))).ok();
+    assert!(read("direct").is_some_and(|bytes| bytes.len() > 1000));
+    let tracks = |folder: &str| bench.json(&["tracks", &format!("{folder}/sway.motion")]);
+    assert_eq!(tracks("direct"), tracks("mapped"));
+    assert_eq!(tracks("direct"), bench.json(&["tracks", "sway.txt"]));
+}
+
+#[test]
+fn tracks_are_shown_drawn_and_tabled() {
+    let bench = Workbench::with_clip();
+    let line = [
+        "tracks",
+        "sway.txt",
+        "--plot",
+        "out/sway.svg",
+        "--csv",
+        "sway.csv",
+    ];
+    let report = bench.json(&line);
+    assert_eq!(report["frames"], 31);
+    assert_eq!(report["loop"], "wrap");
+    let height = report["com_height_m"]["mean"].as_f64();
+    assert!(
+        height.is_some_and(|h| (0.7..1.1).contains(&h)),
+        "somebody stands: {height:?}"
+    );
+    let contacts: Vec<_> = report["contacts"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .collect();
+    assert!(
+        contacts.len() >= 2 && contacts.iter().all(|c| c["share"] == 1.0),
+        "on both feet"
+    );
+    let svg = std::fs::read_to_string(bench.path("out/sway.svg")).unwrap_or_default();
+    assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
+    assert!(!svg.contains("NaN"));
+    let csv = std::fs::read_to_string(bench.path("sway.csv")).unwrap_or_default();
+    let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert_eq!(columns.len(), 32, "a heading and a row per frame");
+    assert!(columns.iter().all(|count| *count == columns[0]));
+}
+
+#[test]
+fn left_out_the_newest_file_is_taken() {
+    let bench = Workbench::with_clip();
+    let said = bench.complaint(&["retarget"], 2);
+    assert!(said.contains("no file given, and no .clip here"), "{said}");
+    bench.mimic(&["import", "sway.txt"]).assert().success();
+    let report = bench.json(&["retarget"]);
+    assert_eq!(report["motion"], "sway.motion");
+    assert_eq!(bench.json(&["tracks"])["motion"], "sway");
+}
+
+#[test]
+fn a_motion_is_recorded_for_the_viewer() {
+    let bench = Workbench::with_clip();
+    let shown = bench.json(&["replay", "sway.txt", "--save", "out/sway.rrd"]);
+    assert_eq!(shown["recording"], "out/sway.rrd");
+    assert_eq!(shown["frames"], 31);
+    assert_eq!(shown["agent"], false);
+    let bytes = std::fs::read(bench.path("out/sway.rrd")).unwrap_or_default();
+    assert!(bytes.starts_with(b"RRF") && bytes.len() > 10_000);
+    let left: Vec<_> = std::fs::read_dir(bench.path("out"))
+        .into_iter()
+        .flatten()
+        .collect();
+    assert_eq!(left.len(), 1, "nothing half-written stays");
+}
+
+#[test]
+fn replay_without_a_viewer_says_how_to_get_one() {
+    let bench = Workbench::with_clip();
+    let mut command = bench.mimic(&["replay", "sway.txt", "--rerun"]);
+    let output = command.env("PATH", bench.path(".")).assert().code(1);
+    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+    assert!(said.contains("pip install rerun-sdk=="), "{said}");
+    assert!(said.contains("--save"), "{said}");
+    bench.mimic(&["replay", "sway.txt"]).assert().code(2);
+}
+
+#[test]
+fn options_that_come_too_late_are_refused() {
+    let bench = Workbench::with_clip();
+    bench.mimic(&["import", "sway.txt"]).assert().success();
+    bench.mimic(&["retarget", "sway.txt"]).assert().success();
+    let said = bench.complaint(&["retarget", "sway.clip", "--fps", "30"], 2);
+    assert!(said.contains("is a clip already"), "{said}");
+    let said = bench.complaint(&["tracks", "sway.motion", "--take", "1"], 2);
+    assert!(said.contains("is a motion already"), "{said}");
+    let said = bench.complaint(&["retarget", "sway.motion"], 2);
+    assert!(said.contains("is retargeted already"), "{said}");
+    let said = bench.complaint(&["retarget", "sway.txt", "--skeleton", "giant"], 2);
+    assert!(said.contains("giant"), "{said}");
+}
+
+#[test]
+fn a_map_with_a_wrong_joint_is_refused_by_name() {
+    let bench = Workbench::with_clip();
+    bench.write("map.json", br#"{ "hips": "pelvis" }"#);
+    let said = bench.complaint(&["retarget", "sway.txt", "--map", "map.json"], 2);
+    assert!(
+        said.contains("map.json") && said.contains("pelvis"),
+        "{said}"
+    );
+}
+
+#[test]
+fn damaged_clips_and_motions_are_named() {
+    let bench = Workbench::with_clip();
+    bench.mimic(&["import", "sway.txt"]).assert().success();
+    bench.mimic(&["retarget", "sway.txt"]).assert().success();
+    for name in ["sway.clip", "sway.motion"] {
+        let whole = std::fs::read(bench.path(name)).expect("the file is there");
+        for keep in [0, 5, whole.len() / 2, whole.len() - 1] {
+            let cut = format!("cut-{keep}-{name}");
+            bench.write(&cut, &whole[..keep]);
+            let said = bench.complaint(&["tracks", &cut], 2);
+            assert!(said.contains(&cut), "{said}");
+        }
+    }
+}
