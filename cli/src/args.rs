@@ -61,7 +61,10 @@ pub enum Verb {
     Import(verbs::import::Args),
     Retarget(verbs::retarget::Args),
     Tracks(verbs::tracks::Args),
+    Train(verbs::train::Args),
+    Eval(verbs::eval::Args),
     Replay(verbs::replay::Args),
+    Bench(verbs::bench::Args),
     Doctor(verbs::doctor::Args),
     Completions(verbs::completions::Args),
     Man(verbs::man::Args),
@@ -153,12 +156,20 @@ impl RetargetArgs {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().map_err(|_| "not a number".to_string())?;
     if number.is_finite() && number > 0.0 {
         Ok(number)
     } else {
         Err("not a positive number".into())
+    }
+}
+
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("at least 1 is needed".into()),
+        Ok(number) => Ok(number),
+        Err(_) => Err("not a whole number".into()),
     }
 }
 

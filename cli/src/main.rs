@@ -8,6 +8,7 @@ mod plot;
 mod prepare;
 mod printer;
 mod recording;
+mod runs;
 mod verbs;
 mod viewer;
 

@@ -51,7 +51,7 @@ pub fn names_folder(out: &Path) -> bool {
     out.is_dir() || out.as_os_str().to_string_lossy().ends_with('/')
 }
 
-fn file_name(name: &str) -> String {
+pub fn file_name(name: &str) -> String {
     let clean = |c: char| {
         if c.is_alphanumeric() || "-_.".contains(c) {
             c

@@ -2,6 +2,7 @@
 
 mod blueprint;
 mod look;
+mod performance;
 mod scene;
 mod series;
 mod write;

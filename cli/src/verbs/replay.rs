@@ -1,12 +1,13 @@
 //! `mimic replay`: an agent with its reference, or a motion alone, in the rerun viewer.
 
-use crate::args::{ImportArgs, RetargetArgs};
+use crate::args::{ImportArgs, RetargetArgs, at_least_one, positive};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::output::make_room;
 use crate::prepare::Preparation;
 use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
+use crate::runs;
 use crate::viewer::{self, Viewer};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,12 @@ pub struct Args {
     /// Show the reference at the agent's side instead of over it
     #[arg(long)]
     beside: bool,
+    /// Seconds to show of a looping motion that an agent performs
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive)]
+    seconds: f64,
+    /// Which motion to show, by number from 1, of a run that learned several
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
+    motion: usize,
     #[command(flatten)]
     import: ImportArgs,
     #[command(flatten)]
@@ -62,11 +69,7 @@ impl Args {
         let viewer = (self.sinks.rerun || self.sinks.serve)
             .then(Viewer::require)
             .transpose()?;
-        let source =
-            locate::file_or_newest(self.what.as_deref(), library, &locate::ANIMATIONS, "motion")?;
-        let preparation = Preparation::new(source.clone(), &self.import, &self.retarget);
-        let prepared = preparation.run(printer)?;
-        let mut shown = Recording::of_motion(&prepared.motion, &prepared.skeleton);
+        let (mut shown, source) = self.record(library, printer)?;
         if self.beside {
             shown.beside = BESIDE;
         }
@@ -79,6 +82,26 @@ impl Args {
             "agent": shown.agent.is_some(),
         });
         printer.result(&json, || summary(&shown, self.sinks.save.as_deref()))
+    }
+}
+
+impl Args {
+    /// A run by path or name, else an animation by path or name; left out, the newest run, else the newest motion.
+    fn record(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
+        let run = match &self.what {
+            Some(what) => locate::existing_run(what),
+            None => locate::newest_run(),
+        };
+        if let Some(run) = run {
+            let recording = runs::record(&runs::open(Some(&run))?, self.motion - 1, self.seconds)?;
+            return Ok((recording, run));
+        }
+        let what = self.what.as_deref();
+        let source = locate::file_or_newest(what, library, &locate::ANIMATIONS, "motion")?;
+        let preparation = Preparation::new(source.clone(), &self.import, &self.retarget);
+        let prepared = preparation.run(printer)?;
+        let recording = Recording::of_motion(&prepared.motion, &prepared.skeleton);
+        Ok((recording, source))
     }
 }
 

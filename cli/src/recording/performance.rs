@@ -1,0 +1,86 @@
+//! An agent's episode as a recording.
+
+use super::{Actor, Curve, Recording, parts};
+use mimic::evaluate::{Frame, Trace};
+use mimic::motion::Motion;
+use mimic::sim::LinkState;
+use mimic::skeleton::Skeleton;
+use mimic::task::{Dynamics, Stage, TERM_NAMES};
+use nalgebra::{Isometry3, Vector3};
+
+impl Recording {
+    /// Agent and reference of one episode.
+    pub fn of_trace(name: &str, trace: &Trace, motion: &Motion, stage: &Stage) -> Self {
+        let skeleton: &Skeleton = &stage.skeleton;
+        let frames = &trace.frames;
+        let agent = |f: &Frame| (poses(stage, &f.agent), f.dynamics, f.contacts.clone());
+        let reference = |f: &Frame| {
+            let sample = &f.reference;
+            (
+                poses(stage, &sample.links),
+                sample.dynamics,
+                sample.contacts.clone(),
+            )
+        };
+        Self {
+            name: name.to_string(),
+            fps: trace.control_hz,
+            parts: parts(skeleton),
+            contact_parts: motion.contact_bodies.clone(),
+            reference: Actor::of_frames(frames.iter().map(reference)),
+            agent: Some(Actor::of_frames(frames.iter().map(agent))),
+            phase: frames
+                .iter()
+                .map(|f| f64::from(f.reference.phase))
+                .collect(),
+            rewards: rewards(frames),
+            beside: 0.0,
+        }
+    }
+}
+
+impl Actor {
+    fn of_frames(frames: impl Iterator<Item = (Vec<Isometry3<f64>>, Dynamics, Vec<bool>)>) -> Self {
+        let mut actor = Self {
+            poses: Vec::new(),
+            com: Vec::new(),
+            angular_momentum: Vec::new(),
+            contact: Vec::new(),
+        };
+        for (poses, dynamics, contact) in frames {
+            actor.poses.push(poses);
+            actor.com.push(wide(&dynamics.com));
+            actor
+                .angular_momentum
+                .push(wide(&dynamics.angular_momentum));
+            actor.contact.push(contact);
+        }
+        actor
+    }
+}
+
+/// World transforms of all bodies, from those of the links that carry them.
+fn poses(stage: &Stage, links: &[LinkState]) -> Vec<Isometry3<f64>> {
+    let body = |(link, offset): &(usize, Isometry3<f64>)| {
+        let link = links
+            .get(*link)
+            .map_or_else(Isometry3::identity, |link| link.pose.cast());
+        link * offset
+    };
+    stage.character.bodies.iter().map(body).collect()
+}
+
+fn rewards(frames: &[Frame]) -> Vec<Curve> {
+    let term = |(index, name): (usize, &&str)| Curve {
+        name: name.replace('_', " "),
+        values: frames
+            .iter()
+            .map(|f| f64::from(f.terms.values()[index]))
+            .collect(),
+    };
+    TERM_NAMES.iter().enumerate().map(term).collect()
+}
+
+fn wide(v: &Vector3<f32>) -> Vector3<f64> {
+    v.cast()
+}

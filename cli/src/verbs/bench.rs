@@ -1,0 +1,243 @@
+//! `mimic bench`: how fast this machine is at every stage of the work.
+
+use crate::args::{at_least_one, positive};
+use crate::failure::{Failure, Outcome};
+use crate::printer::Printer;
+use crate::runs;
+use mimic::clip::Clip;
+use mimic::import;
+use mimic::learn::{Plan, Trainer};
+use mimic::motion::Motion;
+use mimic::retarget;
+use mimic::sim::World;
+use mimic::skeleton::Skeleton;
+use mimic::task::{Imitate, Reference, Stage};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::fmt::Write;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic bench                       about ten seconds
+  mimic bench --seconds 10 --json   longer and steadier, for scripts";
+
+/// The same clip on every machine.
+const CLIP: &[u8] = include_bytes!("../../../clips/walk.glb");
+
+/// Length of an environment's episode, seconds.
+const HORIZON_S: f64 = 20.0;
+
+/// Measure this machine: physics, environment, training and retargeting
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Seconds for each measurement
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive)]
+    seconds: f64,
+    /// Threads [default: all]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    threads: Option<usize>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    threads: usize,
+    physics_steps_per_second: f64,
+    env_steps_per_second: f64,
+    train_samples_per_second: f64,
+    control_hz: f64,
+    physics_hz: f64,
+    dof: usize,
+    network: Vec<usize>,
+    reference_frames_per_second: f64,
+    retarget_frames_per_second: f64,
+}
+
+/// What is measured with.
+struct Bench {
+    plan: Plan,
+    clip: Clip,
+    motion: Motion,
+    stage: Arc<Stage>,
+    reference: Arc<Reference>,
+    threads: usize,
+    time: Duration,
+}
+
+impl Args {
+    pub fn run(self, printer: &Printer) -> Outcome {
+        let threads = runs::use_threads(self.threads)?;
+        let bench = Bench::new(threads, Duration::from_secs_f64(self.seconds))?;
+        let say = |what: &str| printer.note(format!("measuring {what}"));
+        let physics = &bench.plan.task.physics;
+        say("retargeting");
+        let retarget_frames_per_second = bench.retarget()?;
+        say("the reference");
+        let reference_frames_per_second = bench.reference();
+        say("physics");
+        let physics_steps_per_second = bench.physics();
+        say("the environment");
+        let env_steps_per_second = bench.environment();
+        say("training");
+        let train_samples_per_second = bench.train()?;
+        let report = Report {
+            threads,
+            physics_steps_per_second,
+            env_steps_per_second,
+            train_samples_per_second,
+            control_hz: physics.control_hz,
+            physics_hz: physics.physics_hz(),
+            dof: bench.stage.character.dof,
+            network: bench.plan.hidden.clone(),
+            reference_frames_per_second,
+            retarget_frames_per_second,
+        };
+        printer.result(&report, || text(&report))
+    }
+}
+
+/// A built-in input that fails is our own fault.
+fn broken(error: impl std::fmt::Display) -> Failure {
+    Failure::work(format!("cannot set up the measurement: {error}"))
+}
+
+impl Bench {
+    fn new(threads: usize, time: Duration) -> Outcome<Self> {
+        let plan = Plan::default();
+        let clip =
+            import::read(CLIP, "walk.glb", None, &import::Options::default()).map_err(broken)?;
+        let skeleton = Skeleton::load("humanoid").map_err(broken)?;
+        let options = retarget::Options::default();
+        let motion = retarget::retarget(&clip, &skeleton, &options)
+            .map_err(broken)?
+            .motion;
+        let stage = Arc::new(Stage::new(skeleton).map_err(broken)?);
+        let reference =
+            Reference::new(&motion, &stage, motion.duration() + HORIZON_S + 1.0).map_err(broken)?;
+        let reference = Arc::new(reference);
+        Ok(Self {
+            plan,
+            clip,
+            motion,
+            stage,
+            reference,
+            threads,
+            time,
+        })
+    }
+
+    fn retarget(&self) -> Outcome<f64> {
+        let options = retarget::Options::default();
+        let once = || retarget::retarget(&self.clip, &self.stage.skeleton, &options);
+        once().map_err(broken)?;
+        Ok(self.frames_per_second(|| once().map_or(0, |done| done.motion.qpos.len())))
+    }
+
+    fn reference(&self) -> f64 {
+        let mut sample = self.reference.blank();
+        let mut time = 0.0;
+        self.frames_per_second(|| {
+            for _ in 0..1000 {
+                time = (time + 0.013) % HORIZON_S;
+                self.reference.sample(time, &mut sample);
+            }
+            1000
+        })
+    }
+
+    /// Integrations of joints and contacts, at `physics_hz`, of a character per thread that falls to the ground.
+    fn physics(&self) -> f64 {
+        let settings = self.plan.task.physics;
+        let mut first = self.reference.blank();
+        self.reference.sample(0.0, &mut first);
+        self.on_all_threads(|| {
+            let mut world = World::new(&self.stage.character, settings);
+            world.reset(&first.links);
+            self.count(|| {
+                for _ in 0..settings.control_hz as usize {
+                    if world.step().is_err() {
+                        break;
+                    }
+                }
+                world.reset(&first.links);
+                settings.physics_hz() as u64
+            })
+        })
+    }
+
+    /// Control steps with observation, reward and reference, without a network.
+    fn environment(&self) -> f64 {
+        self.on_all_threads(|| {
+            let mut env = Imitate::new(self.stage.clone(), self.reference.clone(), &self.plan.task);
+            let action = vec![0.0; env.action_size()];
+            let mut observation = vec![0.0; env.observation_size()];
+            env.reset(0.0);
+            self.count(|| {
+                env.observe(&mut observation);
+                if env.step(&action).outcome != mimic::task::Outcome::Running {
+                    env.reset(0.0);
+                }
+                1
+            })
+        })
+    }
+
+    /// Whole iterations: acting, physics, learning.
+    fn train(&self) -> Outcome<f64> {
+        let stage = Stage::clone(&self.stage);
+        let motions = std::slice::from_ref(&self.motion);
+        let mut trainer = Trainer::new(self.plan.clone(), stage, motions).map_err(broken)?;
+        trainer.iterate().map_err(runs::learn_failure)?;
+        let (start, before) = (Instant::now(), trainer.samples());
+        while start.elapsed() < self.time {
+            trainer.iterate().map_err(runs::learn_failure)?;
+        }
+        Ok((trainer.samples() - before) as f64 / start.elapsed().as_secs_f64())
+    }
+
+    fn frames_per_second(&self, mut work: impl FnMut() -> usize) -> f64 {
+        self.count(|| work() as u64)
+    }
+
+    /// Units of `work` per second, repeated until the time is up.
+    fn count(&self, mut work: impl FnMut() -> u64) -> f64 {
+        let start = Instant::now();
+        let mut done = 0;
+        while start.elapsed() < self.time {
+            done += work();
+        }
+        done as f64 / start.elapsed().as_secs_f64()
+    }
+
+    fn on_all_threads(&self, work: impl Fn() -> f64 + Sync) -> f64 {
+        (0..self.threads)
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|_| work())
+            .sum()
+    }
+}
+
+fn text(report: &Report) -> String {
+    let layers: Vec<String> = report.network.iter().map(usize::to_string).collect();
+    let mut text = format!(
+        "{} threads, {} degrees of freedom, {} Hz control, {} Hz physics, network {}\n",
+        report.threads,
+        report.dof,
+        report.control_hz,
+        report.physics_hz,
+        layers.join("-")
+    );
+    for (name, value) in [
+        ("physics steps", report.physics_steps_per_second),
+        ("environment steps", report.env_steps_per_second),
+        ("training samples", report.train_samples_per_second),
+        ("reference frames", report.reference_frames_per_second),
+        ("retargeted frames", report.retarget_frames_per_second),
+    ] {
+        writeln!(text, "  {name:20} {value:>12.0} /s").ok();
+    }
+    text
+}

@@ -1,0 +1,308 @@
+//! `mimic train`: a policy learns to perform a motion under physics.
+
+mod progress;
+mod stop;
+
+use crate::args::{ImportArgs, RetargetArgs, at_least_one, positive};
+use crate::failure::{Failure, Outcome};
+use crate::locate;
+use crate::prepare::{Preparation, Prepared};
+use crate::printer::Printer;
+use crate::runs;
+use crate::verbs::{eval, replay};
+use clap::ValueEnum;
+use mimic::evaluate::Options;
+use mimic::learn::{Plan, Run, Trainer};
+use progress::Progress;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use stop::Stop;
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic train kick.fbx                              imports, retargets, and learns it: runs/kick
+  mimic train kick.motion --minutes 10 --seed 7 --out runs/kick-seed7
+  mimic train walk.motion run.motion                one policy for both
+  mimic train --resume kick                         goes on where it stopped, to the same bits
+  mimic train kick.fbx --json > curve.jsonl         a line per iteration
+
+The run folder holds config.json, metrics.jsonl, checkpoint and policy, at the end also eval.json and replay.rrd.
+A finished run is never overwritten: the next run of the same clip is runs/kick-2. Ctrl-C ends the round that is
+under way, saves, and stops; a second Ctrl-C stops at once, at the last checkpoint.";
+
+/// Seconds of a looping motion in the recording of a finished run.
+const REPLAY_S: f64 = 10.0;
+
+/// Train a policy that performs a motion under physics
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Motions, clips or animation files [default: the newest motion]
+    #[arg(value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// What is learned
+    #[arg(long, value_enum, default_value_t)]
+    task: Task,
+    /// Settings to start from: `default`, or a JSON file with a plan as in a run's config.json
+    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    preset: String,
+    /// Samples to learn from, e.g. 5M or 800k [default: as the preset says]
+    #[arg(long, value_name = "N", value_parser = count)]
+    samples: Option<u64>,
+    /// Stop after this many minutes, if the samples last longer
+    #[arg(long, value_name = "MIN", value_parser = positive)]
+    minutes: Option<f64>,
+    /// Seed of all random numbers; the same seed gives the same bits [default: as the preset says]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Threads [default: all]; the result is the same at any number
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    threads: Option<usize>,
+    /// Go on with a run that was stopped
+    #[arg(
+        long,
+        value_name = "RUN",
+        conflicts_with_all = ["inputs", "out", "samples", "seed", "preset", "task", "ImportArgs", "RetargetArgs"]
+    )]
+    resume: Option<PathBuf>,
+    /// Folder of the run [default: runs/CLIP, numbered when that exists]
+    #[arg(long, short, value_name = "RUN")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    import: ImportArgs,
+    #[command(flatten)]
+    retarget: RetargetArgs,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum Task {
+    /// Follow the motion, guided by its phase
+    #[default]
+    Imitate,
+}
+
+/// How a training session came to its end.
+enum End {
+    Done,
+    OutOfTime,
+    Interrupted,
+}
+
+impl Args {
+    pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
+        let threads = runs::use_threads(self.threads)?;
+        let run = match &self.resume {
+            Some(run) => runs::open(Some(run))?,
+            None => self.create(library, printer)?,
+        };
+        let mut trainer = run.trainer().map_err(runs::failure)?;
+        let folder = run.dir().display().to_string();
+        if trainer.is_done() {
+            let samples = trainer.samples();
+            return Err(Failure::user(format!(
+                "`{folder}` is finished, it has learned from all its {samples} samples"
+            )));
+        }
+        printer.note(format!(
+            "training `{folder}` on {threads} threads; Ctrl-C saves and stops"
+        ));
+        let minutes = self
+            .minutes
+            .map(|minutes| Duration::from_secs_f64(60.0 * minutes));
+        match session(&run, &mut trainer, minutes, printer)? {
+            End::Interrupted => {
+                printer.note(format!(
+                    "stopped; go on with `mimic train --resume {folder}`"
+                ));
+                Ok(())
+            }
+            End::OutOfTime | End::Done => finish(&run, printer),
+        }
+    }
+
+    /// Everything a run is made of is read and checked before its folder appears.
+    fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
+        let Task::Imitate = self.task;
+        let plan = self.plan()?;
+        let preparations = self.preparations(library)?;
+        let folder = self.folder(&preparations, printer)?;
+        let mut motions = Vec::new();
+        let mut skeleton = None;
+        for preparation in &preparations {
+            let Prepared {
+                motion,
+                skeleton: own,
+                ..
+            } = preparation.run(printer)?;
+            let skeleton = skeleton.get_or_insert(own);
+            motion
+                .check_skeleton(skeleton)
+                .map_err(|e| Failure::input(&preparation.file, e))?;
+            motions.push(motion);
+        }
+        let skeleton = skeleton.ok_or_else(|| Failure::user("no motion to learn"))?;
+        Run::create(&folder, plan, skeleton, motions).map_err(runs::failure)
+    }
+
+    fn preparations(&self, library: &Path) -> Outcome<Vec<Preparation>> {
+        let find = |wanted: Option<&Path>| {
+            locate::file_or_newest(wanted, library, &locate::ANIMATIONS, "motion")
+        };
+        let files: Vec<PathBuf> = if self.inputs.is_empty() {
+            vec![find(None)?]
+        } else {
+            self.inputs
+                .iter()
+                .map(|input| find(Some(input)))
+                .collect::<Outcome<_>>()?
+        };
+        let prepare = |file| Preparation::new(file, &self.import, &self.retarget);
+        Ok(files.into_iter().map(prepare).collect())
+    }
+
+    fn folder(&self, preparations: &[Preparation], printer: &Printer) -> Outcome<PathBuf> {
+        if let Some(out) = &self.out {
+            if locate::is_run(out) {
+                let out = out.display();
+                return Err(Failure::user(format!(
+                    "`{out}` holds a run already, choose another `--out`, or go on with `--resume {out}`"
+                )));
+            }
+            return Ok(out.clone());
+        }
+        let names: Vec<String> = preparations.iter().map(Preparation::name).collect();
+        let name = match names.as_slice() {
+            [first, _, _, ..] => format!("{first}-and-{}-more", names.len() - 1),
+            few => few.join("-and-"),
+        };
+        let folder = runs::free_folder(&crate::output::file_name(&name));
+        if folder
+            .file_name()
+            .is_some_and(|taken| taken != name.as_str())
+        {
+            printer.note(format!(
+                "a run `{name}` is there already, this one becomes `{}`",
+                folder.display()
+            ));
+        }
+        Ok(folder)
+    }
+
+    fn plan(&self) -> Outcome<Plan> {
+        let mut plan = preset(&self.preset)?;
+        plan.samples = self.samples.unwrap_or(plan.samples);
+        plan.seed = self.seed.unwrap_or(plan.seed);
+        Ok(plan)
+    }
+}
+
+fn preset(name: &str) -> Outcome<Plan> {
+    if name == "default" {
+        return Ok(Plan::default());
+    }
+    let path = Path::new(name);
+    if !path.is_file() {
+        return Err(Failure::user(format!(
+            "no preset `{name}`, there is `default`, or give a JSON file with a plan"
+        )));
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, e))?;
+    serde_json::from_str(&text)
+        .map_err(|e| Failure::input(path, format!("not a training plan: {e}")))
+}
+
+/// Learns until the samples or the time are used up, or somebody wants to stop. Checkpoints stand between rounds,
+/// where a run resumes to the same bits.
+fn session(
+    run: &Run,
+    trainer: &mut Trainer,
+    time: Option<Duration>,
+    printer: &Printer,
+) -> Outcome<End> {
+    let stop = Stop::on_ctrl_c()?;
+    let begun = Instant::now();
+    let mut progress = Progress::new(run, trainer, printer);
+    let end = loop {
+        let metrics = trainer.iterate().map_err(runs::learn_failure)?;
+        let line = progress.line(&metrics);
+        run.log(&line).map_err(runs::failure)?;
+        progress.show(&metrics, &line, printer)?;
+        if trainer.is_done() {
+            break End::Done;
+        }
+        if stop.is_wanted() {
+            progress.say("ending this round");
+        }
+        if !trainer.is_between_rounds() {
+            continue;
+        }
+        run.save(trainer).map_err(runs::failure)?;
+        if stop.is_wanted() {
+            break End::Interrupted;
+        }
+        if time.is_some_and(|time| begun.elapsed() >= time) {
+            break End::OutOfTime;
+        }
+    };
+    progress.end();
+    run.save(trainer).map_err(runs::failure)?;
+    Ok(end)
+}
+
+/// Measures and records what was learned.
+fn finish(run: &Run, printer: &Printer) -> Outcome {
+    let results = runs::evaluate(run, &Options::default(), printer)?;
+    let folder = run.dir().display();
+    match runs::record(run, 0, REPLAY_S) {
+        Ok(shown) => replay::save(&shown, &run.dir().join("replay.rrd"), run.dir())?,
+        Err(failure) => printer.warn(failure.message().unwrap_or_default()),
+    }
+    if !printer.is_json() {
+        printer.text(&format!("{folder}\n{}", eval::text(&results)))?;
+    }
+    printer.note(format!("watch it with `mimic replay {folder} --rerun`"));
+    Ok(())
+}
+
+/// A whole number, with k for thousands and M for millions.
+fn count(text: &str) -> Result<u64, String> {
+    let (number, unit) = match text.trim_end_matches(['k', 'K', 'm', 'M']) {
+        number if number.len() + 1 < text.len() => {
+            return Err(format!("`{text}` is no number of samples"));
+        }
+        number => (number, &text[number.len()..]),
+    };
+    let factor = match unit {
+        "" => 1.0,
+        "k" | "K" => 1e3,
+        _ => 1e6,
+    };
+    let value: f64 = number
+        .parse()
+        .map_err(|_| "give a number, e.g. 5M or 800k".to_string())?;
+    let value = value * factor;
+    if value >= 1.0 && value <= 1e15 {
+        Ok(value as u64)
+    } else {
+        Err("at least 1 is needed".into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_units() {
+        assert_eq!(count("4096"), Ok(4096));
+        assert_eq!(count("800k"), Ok(800_000));
+        assert_eq!(count("2.5M"), Ok(2_500_000));
+        assert_eq!(count("1e6"), Ok(1_000_000));
+        assert!(
+            count("0").is_err()
+                && count("-5").is_err()
+                && count("5kM").is_err()
+                && count("M").is_err()
+        );
+    }
+}
