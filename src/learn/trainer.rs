@@ -48,7 +48,7 @@ impl Default for Plan {
             group: 16,
             horizon: 64,
             round: 20,
-            samples: 5_000_000,
+            samples: 4_000_000,
             final_std: 0.4,
         }
     }
