@@ -10,6 +10,7 @@
 
 pub mod clip;
 pub mod evaluate;
+pub mod file;
 pub mod humanoid;
 pub mod import;
 pub mod learn;

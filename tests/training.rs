@@ -15,12 +15,17 @@ fn skeleton() -> Skeleton {
 fn kick() -> Motion {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("clips/kick.fbx");
     let clip = import::load(file, &import::Options::default()).expect("our own kick reads");
-    retarget::retarget(&clip, &skeleton(), &Default::default()).expect("our own kick retargets").motion
+    retarget::retarget(&clip, &skeleton(), &Default::default())
+        .expect("our own kick retargets")
+        .motion
 }
 
 fn tiny() -> Plan {
     Plan {
-        ppo: Config { minibatch: 64, ..Plan::default().ppo },
+        ppo: Config {
+            minibatch: 64,
+            ..Plan::default().ppo
+        },
         hidden: vec![32, 16],
         environments: 12,
         group: 4,
@@ -36,30 +41,54 @@ fn learned(trainer: &mut Trainer, iterations: usize) -> Vec<u32> {
         let metrics = trainer.iterate().expect("training stays finite");
         assert!(metrics.update.steps > 0, "an iteration learned nothing");
     }
-    trainer.learner().parameters().iter().map(|p| p.to_bits()).collect()
+    trainer
+        .learner()
+        .parameters()
+        .iter()
+        .map(|p| p.to_bits())
+        .collect()
 }
 
 fn on_threads(threads: usize, work: impl FnOnce() -> Vec<u32> + Send) -> Vec<u32> {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start").install(work)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads start")
+        .install(work)
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bits_at_any_number_of_threads() {
     let train = |seed| {
         let plan = Plan { seed, ..tiny() };
-        let mut trainer = Trainer::new(plan, Stage::new(skeleton()).expect("a stage"), &[kick()]).expect("a trainer");
+        let mut trainer = Trainer::new(plan, Stage::new(skeleton()).expect("a stage"), &[kick()])
+            .expect("a trainer");
         learned(&mut trainer, 4)
     };
     let one = on_threads(1, || train(7));
-    assert_eq!(one, on_threads(2, || train(7)), "two threads learned something else");
-    assert_eq!(one, on_threads(5, || train(7)), "five threads learned something else");
+    assert_eq!(
+        one,
+        on_threads(2, || train(7)),
+        "two threads learned something else"
+    );
+    assert_eq!(
+        one,
+        on_threads(5, || train(7)),
+        "five threads learned something else"
+    );
     assert_ne!(one, on_threads(1, || train(8)), "the seed changes nothing");
 }
 
 #[test]
 fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let whole = Run::create(&folder.path().join("whole"), tiny(), skeleton(), vec![kick()]).expect("a run");
+    let whole = Run::create(
+        &folder.path().join("whole"),
+        tiny(),
+        skeleton(),
+        vec![kick()],
+    )
+    .expect("a run");
     let unbroken = learned(&mut whole.trainer().expect("a trainer"), 6);
 
     let path = folder.path().join("broken");
@@ -71,9 +100,16 @@ fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
     learned(&mut trainer, 1);
     drop((run, trainer));
 
-    let mut resumed = Run::open(&path).expect("the run opens").trainer().expect("a trainer");
+    let mut resumed = Run::open(&path)
+        .expect("the run opens")
+        .trainer()
+        .expect("a trainer");
     assert_eq!(resumed.iteration(), 4);
-    assert_eq!(unbroken, learned(&mut resumed, 2), "the resumed run learned something else");
+    assert_eq!(
+        unbroken,
+        learned(&mut resumed, 2),
+        "the resumed run learned something else"
+    );
 }
 
 #[test]
@@ -81,5 +117,11 @@ fn a_run_is_never_overwritten() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     Run::create(folder.path(), tiny(), skeleton(), vec![kick()]).expect("a run");
     let again = Run::create(folder.path(), tiny(), skeleton(), vec![kick()]);
-    assert!(again.err().expect("refused").to_string().contains("already holds a run"));
+    assert!(
+        again
+            .err()
+            .expect("refused")
+            .to_string()
+            .contains("already holds a run")
+    );
 }

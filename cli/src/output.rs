@@ -1,21 +1,11 @@
 //! Where results are written.
 
 use crate::failure::{Failure, Outcome};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Writes a file as a whole or not at all.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Outcome {
-    let name = path.file_name().ok_or_else(|| no_file_name(path))?;
-    let mut temporary = name.to_os_string();
-    temporary.push(format!(".{}.part", std::process::id()));
-    let temporary = path.with_file_name(temporary);
-    fs::write(&temporary, bytes)
-        .and_then(|()| fs::rename(&temporary, path))
-        .map_err(|e| {
-            fs::remove_file(&temporary).ok();
-            Failure::write(path, e)
-        })
+    mimic::file::replace(path, bytes).map_err(|e| Failure::write(path, e))
 }
 
 /// Path of a result: the file `--out` names, or `NAME.EXTENSION` in the folder it names, or in this folder.
@@ -31,7 +21,7 @@ pub fn result_path(out: Option<&Path>, name: &str, extension: &str) -> PathBuf {
 /// Creates the folder of a result, and refuses to replace the input it comes from.
 pub fn make_room(path: &Path, input: &Path) -> Outcome {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
     }
     let same = match (path.canonicalize(), input.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
@@ -66,10 +56,6 @@ pub fn file_name(name: &str) -> String {
     } else {
         name.into()
     }
-}
-
-fn no_file_name(path: &Path) -> Failure {
-    Failure::user(format!("`{}` names no file", path.display()))
 }
 
 #[cfg(test)]

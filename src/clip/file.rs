@@ -10,7 +10,6 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::Path;
 
 const FORMAT: &str = "clip";
@@ -48,13 +47,7 @@ impl Clip {
             source,
         };
         let bytes = self.to_bytes().map_err(|e| Error::broken(path, e))?;
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        let mut file = temporary_in(folder.unwrap_or(Path::new("."))).map_err(io)?;
-        file.write_all(&bytes)
-            .and_then(|()| file.as_file().sync_all())
-            .map_err(io)?;
-        file.persist(path).map_err(|e| io(e.error))?;
-        Ok(())
+        crate::file::replace(path, &bytes).map_err(io)
     }
 
     /// Reads the clip file `path`.
@@ -151,18 +144,6 @@ impl Clip {
             problems: header.problems,
         })
     }
-}
-
-/// A temporary file that, once renamed, has the permissions of any new file.
-fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".clip-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
 }
 
 fn header(bytes: &[u8]) -> Result<Header, String> {

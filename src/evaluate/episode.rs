@@ -44,9 +44,22 @@ pub struct Trace {
 ///
 /// # Errors
 /// Observations that stopped being finite.
-pub fn play(performer: &Performer, which: usize, start: f64, seconds: f64) -> Result<Trace, LearnError> {
-    let rules = Terminations { distance: f32::INFINITY, fall: true, reward: None };
-    let setting = Setting { terminations: rules, episode_s: seconds, ..*performer.setting() };
+pub fn play(
+    performer: &Performer,
+    which: usize,
+    start: f64,
+    seconds: f64,
+) -> Result<Trace, LearnError> {
+    let rules = Terminations {
+        distance: f32::INFINITY,
+        fall: true,
+        reward: None,
+    };
+    let setting = Setting {
+        terminations: rules,
+        episode_s: seconds,
+        ..*performer.setting()
+    };
     let reference = &performer.references()[which];
     let mut env = performer.environment(which, &setting);
     env.reset(start * env.last_start());
@@ -77,7 +90,11 @@ pub fn play(performer: &Performer, which: usize, start: f64, seconds: f64) -> Re
             agent: env.states().to_vec(),
             reference: sample,
             dynamics: *env.dynamics(),
-            contacts: trace.contact_links.iter().map(|&link| env.contacts()[link]).collect(),
+            contacts: trace
+                .contact_links
+                .iter()
+                .map(|&link| env.contacts()[link])
+                .collect(),
             terms: step.terms,
             reward: step.reward,
         });
@@ -88,15 +105,19 @@ pub fn play(performer: &Performer, which: usize, start: f64, seconds: f64) -> Re
 }
 
 /// World positions of all the skeleton's bodies, welded ones included, metres.
-pub(super) fn positions<'a>(stage: &'a Stage, links: &'a [LinkState]) -> impl Iterator<Item = Vector3<f32>> + 'a {
-    stage
-        .character
-        .bodies
-        .iter()
-        .map(|(link, offset)| (links[*link].pose * Point3::from(offset.translation.vector.cast::<f32>())).coords)
+pub(super) fn positions<'a>(
+    stage: &'a Stage,
+    links: &'a [LinkState],
+) -> impl Iterator<Item = Vector3<f32>> + 'a {
+    stage.character.bodies.iter().map(|(link, offset)| {
+        (links[*link].pose * Point3::from(offset.translation.vector.cast::<f32>())).coords
+    })
 }
 
 fn mean_distance(stage: &Stage, a: &[LinkState], b: &[LinkState]) -> f32 {
-    let sum: f32 = positions(stage, a).zip(positions(stage, b)).map(|(p, q)| (p - q).norm()).sum();
+    let sum: f32 = positions(stage, a)
+        .zip(positions(stage, b))
+        .map(|(p, q)| (p - q).norm())
+        .sum();
     sum / stage.character.bodies.len() as f32
 }

@@ -44,13 +44,19 @@ pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
     let per_episode = |value: &dyn Fn(&Trace) -> f64| mean(traces.iter().map(value));
     let frames = || traces.iter().flat_map(|t| &t.frames);
     let per_frame = |value: &dyn Fn(&Frame) -> f64| mean(frames().map(value));
-    let largest_momentum = frames().map(|f| f.reference.dynamics.angular_momentum.norm()).fold(0.0, f32::max);
+    let largest_momentum = frames()
+        .map(|f| f.reference.dynamics.angular_momentum.norm())
+        .fold(0.0, f32::max);
     Evaluation {
         episodes: traces.len(),
         survival: per_episode(&survival),
         survival_from_start: mean(traces.iter().filter(|t| t.start == 0.0).map(survival)),
         success_mean_0_5: per_episode(&|t| f64::from(u8::from(t.failure.is_none()))),
-        success_max_0_25: per_episode(&|t| f64::from(u8::from(t.failure.is_none() && stays_within(stage, t, 0.25)))),
+        success_max_0_25: per_episode(&|t| {
+            f64::from(u8::from(
+                t.failure.is_none() && stays_within(stage, t, 0.25),
+            ))
+        }),
         mpjpe_global_mm: 1e3 * per_frame(&|f| mean_error(stage, f, false)),
         mpjpe_local_mm: 1e3 * per_frame(&|f| mean_error(stage, f, true)),
         velocity_error_m_s: per_frame(&velocity_error),
@@ -68,7 +74,9 @@ pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + value, count + 1));
+    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| {
+        (sum + value, count + 1)
+    });
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
@@ -78,8 +86,14 @@ fn survival(trace: &Trace) -> f64 {
 
 fn errors<'a>(stage: &'a Stage, frame: &'a Frame, local: bool) -> impl Iterator<Item = f64> + 'a {
     let (a, b) = (&frame.agent, &frame.reference.links);
-    let shift = if local { a[0].pose.translation.vector - b[0].pose.translation.vector } else { Vector3::zeros() };
-    positions(stage, a).zip(positions(stage, b)).map(move |(p, q)| f64::from((p - q - shift).norm()))
+    let shift = if local {
+        a[0].pose.translation.vector - b[0].pose.translation.vector
+    } else {
+        Vector3::zeros()
+    };
+    positions(stage, a)
+        .zip(positions(stage, b))
+        .map(move |(p, q)| f64::from((p - q - shift).norm()))
 }
 
 fn mean_error(stage: &Stage, frame: &Frame, local: bool) -> f64 {
@@ -87,11 +101,20 @@ fn mean_error(stage: &Stage, frame: &Frame, local: bool) -> f64 {
 }
 
 fn stays_within(stage: &Stage, trace: &Trace, limit: f64) -> bool {
-    trace.frames.iter().all(|frame| errors(stage, frame, false).all(|error| error <= limit))
+    trace
+        .frames
+        .iter()
+        .all(|frame| errors(stage, frame, false).all(|error| error <= limit))
 }
 
 fn velocity_error(frame: &Frame) -> f64 {
-    mean(frame.agent.iter().zip(&frame.reference.links).map(|(a, b)| f64::from((a.linear - b.linear).norm())))
+    mean(
+        frame
+            .agent
+            .iter()
+            .zip(&frame.reference.links)
+            .map(|(a, b)| f64::from((a.linear - b.linear).norm())),
+    )
 }
 
 fn contact_f1(traces: &[Trace]) -> f64 {
@@ -103,14 +126,23 @@ fn contact_f1(traces: &[Trace]) -> f64 {
         }
     }
     // 2PR/(P + R) = 2·TP / (TP + FP + TP + FN).
-    if either == 0 { 1.0 } else { 2.0 * both as f64 / either as f64 }
+    if either == 0 {
+        1.0
+    } else {
+        2.0 * both as f64 / either as f64
+    }
 }
 
 fn foot_skate(stage: &Stage, traces: &[Trace]) -> f64 {
     mean(traces.iter().flat_map(|trace| {
         trace.frames.iter().flat_map(move |frame| {
-            let standing = trace.contact_links.iter().zip(&frame.contacts).filter(|(_, contact)| **contact);
-            standing.map(move |(&link, _)| sole_speed(&stage.character.links[link], &frame.agent[link]))
+            let standing = trace
+                .contact_links
+                .iter()
+                .zip(&frame.contacts)
+                .filter(|(_, contact)| **contact);
+            standing
+                .map(move |(&link, _)| sole_speed(&stage.character.links[link], &frame.agent[link]))
         })
     }))
 }
@@ -123,7 +155,10 @@ fn sole_speed(link: &Link, state: &LinkState) -> f64 {
         .map(|shape| lowest_point(shape, state))
         .min_by(|a, b| a.z.total_cmp(&b.z))
         .unwrap_or(state.pose.translation.vector);
-    let velocity = state.linear + state.angular.cross(&(lowest - state.pose.translation.vector));
+    let velocity = state.linear
+        + state
+            .angular
+            .cross(&(lowest - state.pose.translation.vector));
     f64::from(velocity.xy().norm())
 }
 
@@ -137,7 +172,8 @@ fn lowest_point(shape: &Shape, state: &LinkState) -> Vector3<f32> {
             below(if a.z < b.z { a } else { b }, *radius)
         }
         Shape::Box { pose, half } => {
-            let down = (state.pose.rotation.cast::<f64>() * pose.rotation).inverse() * -Vector3::z();
+            let down =
+                (state.pose.rotation.cast::<f64>() * pose.rotation).inverse() * -Vector3::z();
             let corner = Vector3::from_fn(|i, _| half[i] * down[i].signum());
             place(&(pose * Point3::from(corner)).coords)
         }
@@ -146,8 +182,23 @@ fn lowest_point(shape: &Shape, state: &LinkState) -> Vector3<f32> {
 
 /// Angle turned about the axis of the reference's own net turning, each in its root's frame.
 fn turned(trace: &Trace) -> f64 {
-    let spin = |state: &LinkState| state.pose.rotation.inverse_transform_vector(&state.angular).cast::<f64>();
-    let net: Vector3<f64> = trace.frames.iter().map(|f| spin(&f.reference.links[0])).sum();
+    let spin = |state: &LinkState| {
+        state
+            .pose
+            .rotation
+            .inverse_transform_vector(&state.angular)
+            .cast::<f64>()
+    };
+    let net: Vector3<f64> = trace
+        .frames
+        .iter()
+        .map(|f| spin(&f.reference.links[0]))
+        .sum();
     let axis = net.try_normalize(1e-9).unwrap_or_else(Vector3::z);
-    trace.frames.iter().map(|f| spin(&f.agent[0]).dot(&axis)).sum::<f64>() / trace.control_hz
+    trace
+        .frames
+        .iter()
+        .map(|f| spin(&f.agent[0]).dot(&axis))
+        .sum::<f64>()
+        / trace.control_hz
 }

@@ -20,7 +20,10 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { episodes: 16, seconds: 20.0 }
+        Self {
+            episodes: 16,
+            seconds: 20.0,
+        }
     }
 }
 
@@ -30,10 +33,21 @@ impl Default for Options {
 ///
 /// # Errors
 /// An agent whose observations stopped being finite.
-pub fn evaluate(performer: &Performer, which: usize, options: &Options) -> Result<Evaluation, LearnError> {
+pub fn evaluate(
+    performer: &Performer,
+    which: usize,
+    options: &Options,
+) -> Result<Evaluation, LearnError> {
     let traces: Result<Vec<Trace>, LearnError> = (0..options.episodes.max(1))
         .into_par_iter()
-        .map(|n| play(performer, which, n as f64 / options.episodes.max(1) as f64, options.seconds))
+        .map(|n| {
+            play(
+                performer,
+                which,
+                n as f64 / options.episodes.max(1) as f64,
+                options.seconds,
+            )
+        })
         .collect();
     Ok(measure(performer.stage(), &traces?))
 }

@@ -5,7 +5,6 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, SafeTensorError, TensorView, serialize};
 use serde_json::Value;
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Why a checkpoint or a policy file can't be written or read.
@@ -103,28 +102,12 @@ impl Writer {
         let views = views.collect::<Result<Vec<_>, _>>().map_err(container)?;
         let metadata = HashMap::from([("mimic".to_owned(), metadata.to_string())]);
         let bytes = serialize(views, Some(metadata)).map_err(container)?;
-        replace(path, &bytes).map_err(|source| FileError::Io {
+        crate::file::replace(path, &bytes).map_err(|source| FileError::Io {
             verb: "write",
             path: path.to_owned(),
             source,
         })
     }
-}
-
-fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; the result should be readable as any other file is.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.prefix(".mimic-").tempfile_in(folder)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
 }
 
 /// The bytes of a file, to be opened as a [`Reader`].

@@ -18,12 +18,12 @@ mod policy;
 mod ppo;
 mod random;
 mod rollout;
-mod stats;
 mod run;
+mod stats;
 mod surrogate;
-mod trainer;
 #[cfg(test)]
 mod tests;
+mod trainer;
 mod value_scale;
 
 pub use adam::{Adam, AdamConfig};

@@ -1,6 +1,8 @@
 //! A trained policy with all that it needs to act: no exploration, no learning.
 
-use super::{ActWorkspace, FrozenNormalizer, LearnError, Normalizer, OBSERVATION_LIMIT, Policy, PolicySpec};
+use super::{
+    ActWorkspace, FrozenNormalizer, LearnError, Normalizer, OBSERVATION_LIMIT, Policy, PolicySpec,
+};
 use crate::task::{Imitate, Reference, Setting, Stage};
 use std::sync::Arc;
 
@@ -35,7 +37,11 @@ impl Performer {
         setting: Setting,
     ) -> Result<Self, LearnError> {
         let policy = Policy::new(spec)?;
-        super::check_length("parameter vector", parameters.len(), policy.parameter_count())?;
+        super::check_length(
+            "parameter vector",
+            parameters.len(),
+            policy.parameter_count(),
+        )?;
         let performer = Performer {
             normalizer: normalizer.frozen(OBSERVATION_LIMIT),
             policy,
@@ -46,7 +52,11 @@ impl Performer {
         };
         for which in 0..performer.references.len() {
             let env = performer.environment(which, &performer.setting);
-            super::check_length("observation", env.observation_size(), performer.policy.spec().observation)?;
+            super::check_length(
+                "observation",
+                env.observation_size(),
+                performer.policy.spec().observation,
+            )?;
             super::check_length("action", env.action_size(), performer.policy.spec().action)?;
         }
         Ok(performer)
@@ -79,6 +89,7 @@ impl Performer {
         memory.normal.resize(memory.seen.len(), 0.0);
         env.observe(&mut memory.seen);
         self.normalizer.apply(&memory.seen, &mut memory.normal)?;
-        self.policy.mean(&self.parameters, &memory.normal, &mut memory.workspace)
+        self.policy
+            .mean(&self.parameters, &memory.normal, &mut memory.workspace)
     }
 }

@@ -39,10 +39,20 @@ pub(super) struct Buffer {
 
 impl Buffer {
     fn clear(&mut self) {
-        for values in [&mut self.raw, &mut self.observations, &mut self.actions, &mut self.log_probs] {
+        for values in [
+            &mut self.raw,
+            &mut self.observations,
+            &mut self.actions,
+            &mut self.log_probs,
+        ] {
             values.clear();
         }
-        for values in [&mut self.values, &mut self.rewards, &mut self.final_values, &mut self.next_values] {
+        for values in [
+            &mut self.values,
+            &mut self.rewards,
+            &mut self.final_values,
+            &mut self.next_values,
+        ] {
             values.clear();
         }
         self.ends.clear();
@@ -83,10 +93,20 @@ pub(super) struct Group {
 
 impl Group {
     /// Environments number `first` to `first + count`, which take the references in turn.
-    pub fn new(stage: &Arc<Stage>, references: &[Arc<Reference>], setting: &Setting, first: usize, count: usize) -> Self {
+    pub fn new(
+        stage: &Arc<Stage>,
+        references: &[Arc<Reference>],
+        setting: &Setting,
+        first: usize,
+        count: usize,
+    ) -> Self {
         let players: Vec<Player> = (first..first + count)
             .map(|number| Player {
-                env: Imitate::new(stage.clone(), references[number % references.len()].clone(), setting),
+                env: Imitate::new(
+                    stage.clone(),
+                    references[number % references.len()].clone(),
+                    setting,
+                ),
                 number: number as u64,
                 rng: ChaCha8Rng::seed_from_u64(0),
                 episode: Episode::default(),
@@ -107,7 +127,11 @@ impl Group {
     /// Starts every environment anew, from a random stream that `seed`, `round` and its number determine alone.
     pub fn restart(&mut self, seed: u64, round: u64) {
         let width = self.width();
-        for (player, row) in self.players.iter_mut().zip(self.current.chunks_exact_mut(width)) {
+        for (player, row) in self
+            .players
+            .iter_mut()
+            .zip(self.current.chunks_exact_mut(width))
+        {
             player.rng = stream(seed, player.number + 1, round);
             player.begin(self.start_anywhere);
             player.env.observe(row);
@@ -122,7 +146,9 @@ impl Group {
             self.step(actor)?;
         }
         actor.normalizer.apply(&self.current, &mut self.normal)?;
-        let values = actor.policy.values(actor.parameters, &self.normal, &mut self.workspace)?;
+        let values = actor
+            .policy
+            .values(actor.parameters, &self.normal, &mut self.workspace)?;
         self.buffer.next_values.extend_from_slice(values);
         Ok(())
     }
@@ -133,11 +159,20 @@ impl Group {
 
     fn act(&mut self, actor: &Actor) -> Result<(), LearnError> {
         let actions = self.noise.len() / self.players.len();
-        for (player, noise) in self.players.iter_mut().zip(self.noise.chunks_exact_mut(actions)) {
+        for (player, noise) in self
+            .players
+            .iter_mut()
+            .zip(self.noise.chunks_exact_mut(actions))
+        {
             fill_normal(noise, &mut player.rng);
         }
         actor.normalizer.apply(&self.current, &mut self.normal)?;
-        let acted = actor.policy.act(actor.parameters, &self.normal, &self.noise, &mut self.workspace)?;
+        let acted = actor.policy.act(
+            actor.parameters,
+            &self.normal,
+            &self.noise,
+            &mut self.workspace,
+        )?;
         let buffer = &mut self.buffer;
         buffer.raw.extend_from_slice(&self.current);
         buffer.observations.extend_from_slice(&self.normal);
@@ -166,7 +201,9 @@ impl Group {
                 Outcome::TimeLimit => {
                     let seen = &mut self.normal[..width];
                     actor.normalizer.apply(row, seen)?;
-                    let value = actor.policy.values(actor.parameters, seen, &mut self.workspace)?[0];
+                    let value = actor
+                        .policy
+                        .values(actor.parameters, seen, &mut self.workspace)?[0];
                     (StepEnd::Truncated, value)
                 }
             };
@@ -185,9 +222,16 @@ impl Group {
 
 impl Player {
     fn begin(&mut self, anywhere: bool) {
-        let share = if anywhere { uniform(&mut self.rng) } else { 0.0 };
+        let share = if anywhere {
+            uniform(&mut self.rng)
+        } else {
+            0.0
+        };
         self.env.reset(share * self.env.last_start());
-        self.episode = Episode { possible: self.env.possible_steps(), ..Episode::default() };
+        self.episode = Episode {
+            possible: self.env.possible_steps(),
+            ..Episode::default()
+        };
     }
 }
 

@@ -1,6 +1,9 @@
 //! The folder of a run: everything needed to resume, replay and reproduce it.
 
-use super::{Checkpoint, FileError, LearnError, Metrics, Performer, Plan, PolicyFile, TrainError, Trainer, TrainerState};
+use super::{
+    Checkpoint, FileError, LearnError, Metrics, Performer, Plan, PolicyFile, TrainError, Trainer,
+    TrainerState,
+};
 use crate::motion::{Motion, MotionError};
 use crate::skeleton::{Skeleton, SkeletonError};
 use crate::task::{Reference, Stage, TaskError};
@@ -14,7 +17,11 @@ use std::sync::Arc;
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     #[error("can't {action} `{}`: {source}", path.display())]
-    Io { action: &'static str, path: PathBuf, source: std::io::Error },
+    Io {
+        action: &'static str,
+        path: PathBuf,
+        source: std::io::Error,
+    },
     #[error("`{}` already holds a run: choose another with --out, or go on with it by --resume", .0.display())]
     Exists(PathBuf),
     #[error("`{}` is no run: it has no config.json", .0.display())]
@@ -66,7 +73,12 @@ impl Run {
     ///
     /// # Errors
     /// A folder that holds a run already, or can't be written.
-    pub fn create(dir: &Path, plan: Plan, skeleton: Skeleton, motions: Vec<Motion>) -> Result<Self, RunError> {
+    pub fn create(
+        dir: &Path,
+        plan: Plan,
+        skeleton: Skeleton,
+        motions: Vec<Motion>,
+    ) -> Result<Self, RunError> {
         if dir.join(CONFIG).exists() {
             return Err(RunError::Exists(dir.to_owned()));
         }
@@ -83,7 +95,8 @@ impl Run {
             motions: (0..motions.len()).map(reference).collect(),
             plan: plan.clone(),
         };
-        let text = serde_json::to_string_pretty(&config).map_err(|e| corrupt(&dir.join(CONFIG), e))?;
+        let text =
+            serde_json::to_string_pretty(&config).map_err(|e| corrupt(&dir.join(CONFIG), e))?;
         write(&dir.join(CONFIG), text.as_bytes())?;
         Run::open(dir)
     }
@@ -99,16 +112,24 @@ impl Run {
         }
         let config: Config = serde_json::from_str(&read(&path)?).map_err(|e| corrupt(&path, e))?;
         if (config.format.as_str(), config.version) != ("run", 1) {
-            let reason = format!("format {} {} is not known to this version", config.format, config.version);
+            let reason = format!(
+                "format {} {} is not known to this version",
+                config.format, config.version
+            );
             return Err(RunError::Config { path, reason });
         }
         let mjcf = read(&dir.join("skeleton.xml"))?;
         let slots = read(&dir.join("skeleton.json"))?;
         let mut motions = Vec::new();
         for name in &config.motions {
-            let plain = Path::new(name).file_name().is_some_and(|file| file == name.as_str());
+            let plain = Path::new(name)
+                .file_name()
+                .is_some_and(|file| file == name.as_str());
             if !plain {
-                return Err(RunError::Config { path, reason: format!("motion `{name}` is not a plain file name") });
+                return Err(RunError::Config {
+                    path,
+                    reason: format!("motion `{name}` is not a plain file name"),
+                });
             }
             motions.push(Motion::load(&dir.join(name))?);
         }
@@ -141,11 +162,24 @@ impl Run {
     /// # Errors
     /// A plan that can't be trained, or a broken checkpoint.
     pub fn trainer(&self) -> Result<Trainer, RunError> {
-        let mut trainer = Trainer::new(self.plan.clone(), Stage::new(self.skeleton.clone())?, &self.motions)?;
+        let mut trainer = Trainer::new(
+            self.plan.clone(),
+            Stage::new(self.skeleton.clone())?,
+            &self.motions,
+        )?;
         let path = self.dir.join(CHECKPOINT);
         if path.exists() {
-            let Checkpoint { iteration, learner, normalizer, .. } = Checkpoint::load(&path)?;
-            trainer.restore(TrainerState { iteration, learner, normalizer })?;
+            let Checkpoint {
+                iteration,
+                learner,
+                normalizer,
+                ..
+            } = Checkpoint::load(&path)?;
+            trainer.restore(TrainerState {
+                iteration,
+                learner,
+                normalizer,
+            })?;
         }
         self.trim_metrics(trainer.iteration())?;
         Ok(trainer)
@@ -156,7 +190,11 @@ impl Run {
     /// # Errors
     /// A folder that can't be written; the last good files stay.
     pub fn save(&self, trainer: &Trainer) -> Result<(), RunError> {
-        let TrainerState { iteration, learner, normalizer } = trainer.state();
+        let TrainerState {
+            iteration,
+            learner,
+            normalizer,
+        } = trainer.state();
         let policy = PolicyFile {
             spec: learner.spec.clone(),
             parameters: learner.parameters.clone(),
@@ -183,7 +221,11 @@ impl Run {
     /// A file that can't be written.
     pub fn log(&self, line: &serde_json::Value) -> Result<(), RunError> {
         let path = self.dir.join(METRICS);
-        let mut file = fs::OpenOptions::new().create(true).append(true).open(&path).map_err(io("open", &path))?;
+        let mut file = fs::OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .map_err(io("open", &path))?;
         writeln!(file, "{line}").map_err(io("write", &path))
     }
 
@@ -208,9 +250,20 @@ impl Run {
         let stage = Arc::new(Stage::new(self.skeleton.clone())?);
         let mut references = Vec::new();
         for motion in &self.motions {
-            references.push(Arc::new(Reference::new(motion, &stage, motion.duration() + horizon_s + 1.0)?));
+            references.push(Arc::new(Reference::new(
+                motion,
+                &stage,
+                motion.duration() + horizon_s + 1.0,
+            )?));
         }
-        Ok(Performer::new(file.spec, file.parameters, &file.normalizer, stage, references, self.plan.task)?)
+        Ok(Performer::new(
+            file.spec,
+            file.parameters,
+            &file.normalizer,
+            stage,
+            references,
+            self.plan.task,
+        )?)
     }
 
     /// Drops the lines of iterations that the checkpoint doesn't know.
@@ -220,10 +273,15 @@ impl Run {
             return Ok(());
         }
         let known = |line: &&str| {
-            serde_json::from_str::<Metrics>(line).is_ok_and(|metrics| metrics.iteration <= iteration)
+            serde_json::from_str::<Metrics>(line)
+                .is_ok_and(|metrics| metrics.iteration <= iteration)
         };
         let text = read(&path)?;
-        let kept: String = text.lines().filter(known).map(|line| format!("{line}\n")).collect();
+        let kept: String = text
+            .lines()
+            .filter(known)
+            .map(|line| format!("{line}\n"))
+            .collect();
         write(&path, kept.as_bytes())
     }
 }
@@ -234,11 +292,18 @@ fn reference(index: usize) -> String {
 
 fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
     let path = path.to_owned();
-    move |source| RunError::Io { action, path, source }
+    move |source| RunError::Io {
+        action,
+        path,
+        source,
+    }
 }
 
 fn corrupt(path: &Path, error: serde_json::Error) -> RunError {
-    RunError::Config { path: path.to_owned(), reason: error.to_string() }
+    RunError::Config {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    }
 }
 
 fn read(path: &Path) -> Result<String, RunError> {
@@ -246,9 +311,5 @@ fn read(path: &Path) -> Result<String, RunError> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io("write in", folder))?;
-    file.write_all(bytes).map_err(io("write", path))?;
-    file.persist(path).map_err(|e| io("replace", path)(e.error))?;
-    Ok(())
+    crate::file::replace(path, bytes).map_err(io("write", path))
 }

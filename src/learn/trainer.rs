@@ -2,9 +2,8 @@
 
 use super::rollout::{Actor, Buffer, Group, stream};
 use super::{
-    OBSERVATION_LIMIT,
-    Batch, Config, LearnError, Learner, LearnerState, Normalizer, PolicySpec, Trajectories, UpdateStats,
-    advantages,
+    Batch, Config, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT, PolicySpec,
+    Trajectories, UpdateStats, advantages,
 };
 use crate::motion::Motion;
 use crate::task::{Reference, Setting, Stage, TERM_NAMES, TaskError, observation_size};
@@ -42,7 +41,11 @@ impl Default for Plan {
         Self {
             seed: 1,
             task: Setting::default(),
-            ppo: Config { initial_std: 0.5, target_kl: Some(0.05), ..Config::default() },
+            ppo: Config {
+                initial_std: 0.5,
+                target_kl: Some(0.05),
+                ..Config::default()
+            },
             hidden: vec![256, 128],
             environments: 64,
             group: 16,
@@ -123,17 +126,32 @@ impl Trainer {
     /// # Errors
     /// A plan or a motion that can't be trained.
     pub fn new(plan: Plan, stage: Stage, motions: &[Motion]) -> Result<Self, TrainError> {
-        for (name, value) in [("environments", plan.environments), ("group", plan.group), ("horizon", plan.horizon)] {
+        for (name, value) in [
+            ("environments", plan.environments),
+            ("group", plan.group),
+            ("horizon", plan.horizon),
+        ] {
             if value == 0 {
                 return Err(TrainError::Zero(name));
             }
         }
         let references: Result<Vec<_>, _> = motions
             .iter()
-            .map(|motion| Reference::new(motion, &stage, motion.duration() + plan.task.episode_s + 1.0).map(Arc::new))
+            .map(|motion| {
+                Reference::new(
+                    motion,
+                    &stage,
+                    motion.duration() + plan.task.episode_s + 1.0,
+                )
+                .map(Arc::new)
+            })
             .collect();
         let references = references?;
-        let contacts = references.first().ok_or(TrainError::NoMotion)?.contact_links.len();
+        let contacts = references
+            .first()
+            .ok_or(TrainError::NoMotion)?
+            .contact_links
+            .len();
         let spec = PolicySpec {
             observation: observation_size(&stage, contacts),
             action: stage.character.dof,
@@ -228,7 +246,9 @@ impl Trainer {
             advantages: &self.batch.advantages,
             returns: &self.batch.returns,
         };
-        let update = self.learner.update(&batch, &mut stream(self.plan.seed, 0, self.iteration + 1))?;
+        let update = self
+            .learner
+            .update(&batch, &mut stream(self.plan.seed, 0, self.iteration + 1))?;
         for group in &self.groups {
             self.normalizer.update(&group.buffer.raw)?;
         }
@@ -248,7 +268,9 @@ impl Trainer {
     fn play(&mut self) -> Result<(), LearnError> {
         if self.is_between_rounds() {
             let (seed, round) = (self.plan.seed, self.iteration / self.plan.round.max(1));
-            self.groups.par_iter_mut().for_each(|group| group.restart(seed, round));
+            self.groups
+                .par_iter_mut()
+                .for_each(|group| group.restart(seed, round));
         }
         let normalizer = self.normalizer.frozen(OBSERVATION_LIMIT);
         let actor = Actor {
@@ -257,12 +279,19 @@ impl Trainer {
             normalizer: &normalizer,
         };
         let steps = self.plan.horizon;
-        self.groups.par_iter_mut().try_for_each(|group| group.collect(steps, &actor))
+        self.groups
+            .par_iter_mut()
+            .try_for_each(|group| group.collect(steps, &actor))
     }
 
     fn gather(&mut self) -> Result<(), LearnError> {
         let batch = &mut self.batch;
-        for values in [&mut batch.observations, &mut batch.actions, &mut batch.log_probs, &mut batch.values] {
+        for values in [
+            &mut batch.observations,
+            &mut batch.actions,
+            &mut batch.log_probs,
+            &mut batch.values,
+        ] {
             values.clear();
         }
         batch.advantages.clear();
@@ -285,7 +314,13 @@ impl Trainer {
                 next_values: &from.next_values,
             };
             let (advantage, value) = (&mut batch.advantages[start..], &mut batch.returns[start..]);
-            advantages(&rollout, self.plan.ppo.gamma, self.plan.ppo.lambda, advantage, value)?;
+            advantages(
+                &rollout,
+                self.plan.ppo.gamma,
+                self.plan.ppo.lambda,
+                advantage,
+                value,
+            )?;
         }
         Ok(())
     }
@@ -303,8 +338,13 @@ impl Trainer {
             iteration: self.iteration,
             samples: self.samples(),
             episode_return: episodes.iter().map(|e| f64::from(e.reward)).sum::<f64>() / n,
-            normalized_return: episodes.iter().map(|e| f64::from(e.reward) / e.possible).sum::<f64>() / n,
-            episode_length: episodes.iter().map(|e| f64::from(e.steps)).sum::<f64>() / n * self.control_dt,
+            normalized_return: episodes
+                .iter()
+                .map(|e| f64::from(e.reward) / e.possible)
+                .sum::<f64>()
+                / n,
+            episode_length: episodes.iter().map(|e| f64::from(e.steps)).sum::<f64>() / n
+                * self.control_dt,
             episodes: episodes.len() as u64,
             update,
             action_std,

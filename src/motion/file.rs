@@ -6,7 +6,6 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3, Vec
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::io::Write as _;
 use std::path::Path;
 
 const FORMAT: &str = "motion";
@@ -47,15 +46,7 @@ impl Motion {
             message,
         };
         let bytes = self.to_bytes().map_err(error)?;
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let io = |e: std::io::Error| error(e.to_string());
-        let mut file = temporary().tempfile_in(folder).map_err(io)?;
-        file.write_all(&bytes).map_err(io)?;
-        file.persist(path).map_err(|e| io(e.error))?;
-        Ok(())
+        crate::file::replace(path, &bytes).map_err(|e| error(e.to_string()))
     }
 
     /// Reads a motion and checks that all its parts fit together.
@@ -176,17 +167,6 @@ impl Motion {
             report: header.report,
         })
     }
-}
-
-/// A temporary file that, unlike the default, others may read as far as the umask allows: it becomes the result.
-fn temporary() -> tempfile::Builder<'static, 'static> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder
 }
 
 fn read_header(bytes: &[u8]) -> Result<Header, String> {

@@ -12,16 +12,39 @@ fn standing(character: &Character, z: f32) -> Vec<LinkState> {
     let mut states: Vec<LinkState> = Vec::new();
     for link in &character.links {
         let pose = match link.parent {
-            None => Isometry3::from_parts(Translation3::new(0.0, 0.0, z), UnitQuaternion::identity()),
+            None => {
+                Isometry3::from_parts(Translation3::new(0.0, 0.0, z), UnitQuaternion::identity())
+            }
             Some(p) => states[p].pose * link.rest.cast(),
         };
-        states.push(LinkState { pose, linear: Vector3::zeros(), angular: Vector3::zeros() });
+        states.push(LinkState {
+            pose,
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+        });
     }
     states
 }
 
+/// Targets that hold the rest pose.
+fn held(character: &Character) -> Vec<Target> {
+    let hold = |joint: &LinkJoint| match joint {
+        LinkJoint::Free => Target::Free,
+        LinkJoint::Ball { .. } => Target::Ball(UnitQuaternion::identity()),
+        LinkJoint::Hinge { .. } => Target::Hinge(0.0),
+    };
+    character
+        .links
+        .iter()
+        .map(|link| hold(&link.joint))
+        .collect()
+}
+
 /// Linear momentum, and angular momentum about the centre of mass.
-fn momenta(character: &Character, states: &[LinkState]) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+fn momenta(
+    character: &Character,
+    states: &[LinkState],
+) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
     let (mut mass, mut com, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
     let mut parts = Vec::new();
     for (link, state) in character.links.iter().zip(states) {
@@ -38,20 +61,28 @@ fn momenta(character: &Character, states: &[LinkState]) -> (Vector3<f64>, Vector
     }
     com /= mass;
     let drift = linear / mass;
-    let about = parts.iter().map(|(m, at, v, spin)| spin + (at - com).cross(&(v - drift)) * *m).sum();
+    let about = parts
+        .iter()
+        .map(|(m, at, v, spin)| spin + (at - com).cross(&(v - drift)) * *m)
+        .sum();
     (linear, about, com)
 }
 
 /// Targets that swing every limb, different at every control step.
 fn swinging(character: &Character, step: usize) -> Vec<Target> {
     let at = |i: usize| (step as f32 * 0.35 + i as f32).sin();
-    let targets = character.links.iter().enumerate().map(|(i, link)| match link.joint {
-        LinkJoint::Free => Target::Free,
-        LinkJoint::Ball { .. } => {
-            Target::Ball(UnitQuaternion::from_scaled_axis(Vector3::new(0.5 * at(i), 0.8 * at(i + 3), 0.3 * at(i + 5))))
-        }
-        LinkJoint::Hinge { .. } => Target::Hinge(0.8 + 0.6 * at(i)),
-    });
+    let targets =
+        character
+            .links
+            .iter()
+            .enumerate()
+            .map(|(i, link)| match link.joint {
+                LinkJoint::Free => Target::Free,
+                LinkJoint::Ball { .. } => Target::Ball(UnitQuaternion::from_scaled_axis(
+                    Vector3::new(0.5 * at(i), 0.8 * at(i + 3), 0.3 * at(i + 5)),
+                )),
+                LinkJoint::Hinge { .. } => Target::Hinge(0.8 + 0.6 * at(i)),
+            });
     targets.collect()
 }
 
@@ -65,7 +96,8 @@ fn in_flight_gravity_alone_changes_momentum_while_limbs_move() {
     let (_, _, com) = momenta(&character, &states);
     for state in &mut states {
         state.angular = spin;
-        state.linear = spin.cross(&(state.pose.translation.vector - com.cast())) + Vector3::new(1.0, -0.5, 5.0);
+        state.linear = spin.cross(&(state.pose.translation.vector - com.cast()))
+            + Vector3::new(1.0, -0.5, 5.0);
     }
     world.reset(&states);
     let mass: f64 = character.links.iter().map(|l| l.mass).sum();
@@ -80,8 +112,14 @@ fn in_flight_gravity_alone_changes_momentum_while_limbs_move() {
         let t = (step + 1) as f64 / 30.0;
         let (p, l, _) = momenta(&character, world.states());
         let expected = p0 + Vector3::new(0.0, 0.0, -9.81 * mass * t);
-        assert!((p - expected).norm() < 1e-3 * p0.norm(), "linear momentum {p:?}, not {expected:?}, after {t} s");
-        assert!((l - l0).norm() < 0.01 * l0.norm(), "angular momentum {l:?}, not {l0:?}, after {t} s");
+        assert!(
+            (p - expected).norm() < 1e-3 * p0.norm(),
+            "linear momentum {p:?}, not {expected:?}, after {t} s"
+        );
+        assert!(
+            (l - l0).norm() < 0.01 * l0.norm(),
+            "angular momentum {l:?}, not {l0:?}, after {t} s"
+        );
     }
     assert!(moved > 0.5, "the limbs hardly moved: {moved} rad");
 }
@@ -107,7 +145,11 @@ fn a_reset_world_gives_the_bits_of_a_new_one() {
         used.step().expect("a falling humanoid stays finite");
     }
     assert_eq!(first, play(&mut used), "the reset remembers something");
-    assert_eq!(first, play(&mut used), "the second reset differs from the first");
+    assert_eq!(
+        first,
+        play(&mut used),
+        "the second reset differs from the first"
+    );
 }
 
 #[test]
@@ -116,14 +158,17 @@ fn a_held_pose_stands_on_the_ground() {
     let mut world = World::new(&character, Settings::default());
     let states = standing(&character, 0.8815);
     world.reset(&states);
-    let hold: Vec<Target> =
-        character.links.iter().map(|l| super::world::target_of(&l.joint, UnitQuaternion::identity())).collect();
+    let hold = held(&character);
     world.set_targets(&hold);
     for _ in 0..10 {
         world.step().expect("standing stays finite");
     }
     let root = world.states()[0].pose.translation.vector;
-    assert!((root.z - 0.8815).abs() < 0.01, "the root sank or rose to {}", root.z);
+    assert!(
+        (root.z - 0.8815).abs() < 0.01,
+        "the root sank or rose to {}",
+        root.z
+    );
     let standing: Vec<&str> = character
         .links
         .iter()
@@ -139,15 +184,17 @@ fn starting_inside_the_ground_adds_no_energy() {
     for depth in [0.03, 0.08] {
         let mut world = World::new(&character, Settings::default());
         world.reset(&standing(&character, 0.8815 - depth));
-        let hold: Vec<Target> =
-            character.links.iter().map(|l| super::world::target_of(&l.joint, UnitQuaternion::identity())).collect();
+        let hold = held(&character);
         world.set_targets(&hold);
         let mut highest: f32 = 0.0;
         for _ in 0..30 {
             world.step().expect("standing stays finite");
             highest = highest.max(world.states()[0].pose.translation.z);
         }
-        assert!(highest < 0.8815 + 0.01, "{depth} m inside, and thrown up to {highest}");
+        assert!(
+            highest < 0.8815 + 0.01,
+            "{depth} m inside, and thrown up to {highest}"
+        );
     }
 }
 
@@ -156,19 +203,31 @@ fn a_ball_drive_reaches_a_large_rotation() {
     let character = humanoid();
     let mut world = World::new(&character, Settings::default());
     world.reset(&standing(&character, 100.0));
-    let shoulder = character.links.iter().position(|l| l.name == "left_upper_arm").expect("a humanoid has arms");
+    let shoulder = character
+        .links
+        .iter()
+        .position(|l| l.name == "left_upper_arm")
+        .expect("a humanoid has arms");
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.9, -2.2, 0.6));
-    let mut targets: Vec<Target> =
-        character.links.iter().map(|l| super::world::target_of(&l.joint, UnitQuaternion::identity())).collect();
+    let mut targets = held(&character);
     targets[shoulder] = Target::Ball(turn);
     world.set_targets(&targets);
     for _ in 0..60 {
         world.step().expect("flight stays finite");
     }
-    let parent = character.links[shoulder].parent.expect("an arm has a parent");
-    let (a, b) = (world.states()[parent].pose.rotation, world.states()[shoulder].pose.rotation);
+    let parent = character.links[shoulder]
+        .parent
+        .expect("an arm has a parent");
+    let (a, b) = (
+        world.states()[parent].pose.rotation,
+        world.states()[shoulder].pose.rotation,
+    );
     let reached = character.joint_rotation(shoulder, a, b);
-    assert!(reached.angle_to(&turn) < 0.02, "off by {} rad", reached.angle_to(&turn));
+    assert!(
+        reached.angle_to(&turn) < 0.02,
+        "off by {} rad",
+        reached.angle_to(&turn)
+    );
 }
 
 #[test]

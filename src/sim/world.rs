@@ -1,7 +1,7 @@
 //! One character on one ground.
 
 use super::build::{self, Built, Scene};
-use super::character::{Character, LinkJoint};
+use super::character::Character;
 use super::{Diverged, Settings, convert};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
@@ -209,14 +209,5 @@ impl World {
                 self.contacts[collider.user_data as usize] = true;
             }
         }
-    }
-}
-
-/// The target that holds a joint at rotation `turn`.
-pub(crate) fn target_of(joint: &LinkJoint, turn: UnitQuaternion<f32>) -> Target {
-    match joint {
-        LinkJoint::Free => Target::Free,
-        LinkJoint::Ball { .. } => Target::Ball(turn),
-        LinkJoint::Hinge { axis, .. } => Target::Hinge(turn.scaled_axis().dot(&axis.cast())),
     }
 }

@@ -23,8 +23,11 @@ pub(crate) struct Masses {
 
 impl Masses {
     pub fn new(character: &Character) -> Self {
-        let links: Vec<_> =
-            character.links.iter().map(|l| (l.mass as f32, l.com.cast(), l.inertia.cast())).collect();
+        let links: Vec<_> = character
+            .links
+            .iter()
+            .map(|l| (l.mass as f32, l.com.cast(), l.inertia.cast()))
+            .collect();
         let total = links.iter().map(|l| l.0).sum();
         Masses { links, total }
     }
@@ -41,11 +44,16 @@ impl Masses {
             let v = state.linear + state.angular.cross(&arm);
             com += at * *mass;
             velocity += v * *mass;
-            about_origin += turn * (inertia * turn.inverse_transform_vector(&state.angular)) + at.cross(&v) * *mass;
+            about_origin += turn * (inertia * turn.inverse_transform_vector(&state.angular))
+                + at.cross(&v) * *mass;
         }
         com /= self.total;
         velocity /= self.total;
         let angular_momentum = about_origin - com.cross(&velocity) * self.total;
-        Dynamics { com, com_velocity: velocity, angular_momentum }
+        Dynamics {
+            com,
+            com_velocity: velocity,
+            angular_momentum,
+        }
     }
 }

@@ -99,13 +99,26 @@ impl Imitate {
             LoopMode::Wrap => limit,
             LoopMode::Clamp => limit.min(self.reference.duration() - self.time),
         };
-        (left * self.setting.physics.control_hz - 1e-6).ceil().max(1.0)
+        (left * self.setting.physics.control_hz - 1e-6)
+            .ceil()
+            .max(1.0)
     }
 
     /// Writes what the policy sees.
     pub fn observe(&self, out: &mut [f32]) {
-        let contacts = self.reference.contact_links.iter().map(|&link| self.world.contacts()[link]);
-        observe(&self.stage, self.world.states(), &self.dynamics, contacts, &self.next, out);
+        let contacts = self
+            .reference
+            .contact_links
+            .iter()
+            .map(|&link| self.world.contacts()[link]);
+        observe(
+            &self.stage,
+            self.world.states(),
+            &self.dynamics,
+            contacts,
+            &self.next,
+            out,
+        );
     }
 
     /// Advances by one control step under `action`.
@@ -114,15 +127,27 @@ impl Imitate {
         let stepped = self.world.step();
         self.time += self.setting.physics.control_dt();
         if stepped.is_err() {
-            return Step { reward: 0.0, terms: Terms::default(), outcome: Outcome::Failed(Failure::Diverged) };
+            return Step {
+                reward: 0.0,
+                terms: Terms::default(),
+                outcome: Outcome::Failed(Failure::Diverged),
+            };
         }
         let states = self.world.states();
         self.dynamics = self.reference.masses().dynamics(states);
-        let terms = terms(&self.stage, (states, &self.dynamics), (&self.next.links, &self.next.dynamics));
+        let terms = terms(
+            &self.stage,
+            (states, &self.dynamics),
+            (&self.next.links, &self.next.dynamics),
+        );
         let reward = terms.total(&self.setting.rewards);
         let outcome = self.outcome(reward);
         self.look_ahead();
-        Step { reward, terms, outcome }
+        Step {
+            reward,
+            terms,
+            outcome,
+        }
     }
 
     /// Link states of the agent.
@@ -145,13 +170,23 @@ impl Imitate {
     }
 
     fn look_ahead(&mut self) {
-        self.reference.sample(self.time + self.setting.physics.control_dt(), &mut self.next);
+        self.reference.sample(
+            self.time + self.setting.physics.control_dt(),
+            &mut self.next,
+        );
     }
 
     fn outcome(&self, reward: f32) -> Outcome {
         let (states, contacts) = (self.world.states(), self.world.contacts());
         let allowed = &self.reference.contact_links;
-        match failure(&self.setting.terminations, states, &self.next.links, contacts, allowed, reward) {
+        match failure(
+            &self.setting.terminations,
+            states,
+            &self.next.links,
+            contacts,
+            allowed,
+            reward,
+        ) {
             Some(failure) => Outcome::Failed(failure),
             None if self.reference.is_over(self.time) => Outcome::Finished,
             None if self.time - self.started >= self.setting.episode_s - 1e-9 => Outcome::TimeLimit,
@@ -177,8 +212,14 @@ impl Imitate {
     /// velocity feed-forward with position drives alone.
     fn residual(&self, link: usize, parent: usize, action: &[f32], scale: f32) -> Target {
         let (mine, other) = (&self.next.links[link], &self.next.links[parent]);
-        let turn = self.stage.character.joint_rotation(link, other.pose.rotation, mine.pose.rotation);
-        let rate = mine.pose.rotation.inverse_transform_vector(&(mine.angular - other.angular));
+        let turn =
+            self.stage
+                .character
+                .joint_rotation(link, other.pose.rotation, mine.pose.rotation);
+        let rate = mine
+            .pose
+            .rotation
+            .inverse_transform_vector(&(mine.angular - other.angular));
         match &self.stage.character.links[link].joint {
             LinkJoint::Free => Target::Free,
             LinkJoint::Ball { drives, .. } => {
@@ -198,7 +239,11 @@ impl Imitate {
 
 /// Seconds by which a drive trails a target that moves at constant speed.
 fn lag(drive: &Drive) -> f32 {
-    if drive.kp > 0.0 { (drive.kd / drive.kp) as f32 } else { 0.0 }
+    if drive.kp > 0.0 {
+        (drive.kd / drive.kp) as f32
+    } else {
+        0.0
+    }
 }
 
 fn absolute(joint: &LinkJoint, action: &[f32], reach: f32) -> Target {

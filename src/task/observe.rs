@@ -90,11 +90,14 @@ pub fn observe(
     w.vector(into_root(Vector3::z()));
     w.vector(into_root(root.linear));
     w.vector(into_root(root.angular));
-    joints(stage, &mut w, |i, p| relative(stage, links, i, p).scaled_axis());
+    joints(stage, &mut w, |i, p| {
+        relative(stage, links, i, p).scaled_axis()
+    });
     joints(stage, &mut w, |i, p| rate(links, i, p));
     for &body in &stage.key_bodies {
         let (link, offset) = &stage.character.bodies[body];
-        let at = links[*link].pose * nalgebra::Point3::from(offset.translation.vector.cast::<f32>());
+        let at =
+            links[*link].pose * nalgebra::Point3::from(offset.translation.vector.cast::<f32>());
         w.vector(into_root(at.coords - center));
     }
     w.vector(into_root(dynamics.com - center));
@@ -104,15 +107,25 @@ pub fn observe(
     joints(stage, &mut w, |i, p| {
         (relative(stage, links, i, p).inverse() * relative(stage, &next.links, i, p)).scaled_axis()
     });
-    joints(stage, &mut w, |i, p| rate(&next.links, i, p) - rate(links, i, p));
+    joints(stage, &mut w, |i, p| {
+        rate(&next.links, i, p) - rate(links, i, p)
+    });
     let wanted = &next.links[0];
     w.vector(into_root(wanted.pose.translation.vector - center));
     w.vector((root.pose.rotation.inverse() * wanted.pose.rotation).scaled_axis());
     w.vector(into_root(wanted.linear - root.linear));
     w.vector(into_root(wanted.angular - root.angular));
-    next.contacts.iter().for_each(|c| w.one(f32::from(u8::from(*c))));
+    next.contacts
+        .iter()
+        .for_each(|c| w.one(f32::from(u8::from(*c))));
     let turn = std::f32::consts::TAU * next.phase;
-    for value in [next.phase, turn.sin(), turn.cos(), (2.0 * turn).sin(), (2.0 * turn).cos()] {
+    for value in [
+        next.phase,
+        turn.sin(),
+        turn.cos(),
+        (2.0 * turn).sin(),
+        (2.0 * turn).cos(),
+    ] {
         w.one(value);
     }
 }
@@ -126,10 +139,15 @@ fn joints(stage: &Stage, w: &mut Writer, value: impl Fn(usize, usize) -> Vector3
 }
 
 fn relative(stage: &Stage, links: &[LinkState], link: usize, parent: usize) -> UnitQuaternion<f32> {
-    stage.character.joint_rotation(link, links[parent].pose.rotation, links[link].pose.rotation)
+    stage
+        .character
+        .joint_rotation(link, links[parent].pose.rotation, links[link].pose.rotation)
 }
 
 /// Angular velocity of a link against its parent, in the link's frame.
 fn rate(links: &[LinkState], link: usize, parent: usize) -> Vector3<f32> {
-    links[link].pose.rotation.inverse_transform_vector(&(links[link].angular - links[parent].angular))
+    links[link]
+        .pose
+        .rotation
+        .inverse_transform_vector(&(links[link].angular - links[parent].angular))
 }

@@ -49,7 +49,9 @@ impl Reference {
             return Err(TaskError::OtherSkeleton { motion, skeleton });
         }
         if motion.qpos.len() < 2 {
-            return Err(TaskError::TooShort { frames: motion.qpos.len() });
+            return Err(TaskError::TooShort {
+                frames: motion.qpos.len(),
+            });
         }
         let duration = motion.duration();
         let cycles = (horizon / duration).ceil() as i64 + 2;
@@ -58,11 +60,17 @@ impl Reference {
             fps: motion.fps,
             loop_mode: motion.loop_mode,
             duration,
-            frames: (0..motion.qpos.len()).map(|f| link_states(motion, skeleton, stage, f)).collect(),
+            frames: (0..motion.qpos.len())
+                .map(|f| link_states(motion, skeleton, stage, f))
+                .collect(),
             contacts: motion.tracks.contact.clone(),
             cycles: (0..cycles).map(|n| motion.cycle_offset(n).cast()).collect(),
             masses: Masses::new(&stage.character),
-            contact_links: motion.contact_bodies.iter().map(|&b| stage.character.bodies[b].0).collect(),
+            contact_links: motion
+                .contact_bodies
+                .iter()
+                .map(|&b| stage.character.bodies[b].0)
+                .collect(),
         })
     }
 
@@ -103,7 +111,11 @@ impl Reference {
         let frame = (at.floor() as usize).min(last - 1);
         let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
         let offset = self.cycles[cycle.min(self.cycles.len() - 1)];
-        for (link, (a, b)) in sample.links.iter_mut().zip(self.frames[frame].iter().zip(&self.frames[frame + 1])) {
+        for (link, (a, b)) in sample
+            .links
+            .iter_mut()
+            .zip(self.frames[frame].iter().zip(&self.frames[frame + 1]))
+        {
             *link = moved(&between(a, b, blend), &offset);
         }
         sample.dynamics = self.masses.dynamics(&sample.links);
@@ -117,13 +129,21 @@ impl Reference {
             LoopMode::Clamp => (0, time.clamp(0.0, self.duration)),
             LoopMode::Wrap => {
                 let cycle = (time / self.duration).floor().max(0.0);
-                (cycle as usize, (time - cycle * self.duration).clamp(0.0, self.duration))
+                (
+                    cycle as usize,
+                    (time - cycle * self.duration).clamp(0.0, self.duration),
+                )
             }
         }
     }
 }
 
-fn link_states(motion: &Motion, skeleton: &Skeleton, stage: &Stage, frame: usize) -> Vec<LinkState> {
+fn link_states(
+    motion: &Motion,
+    skeleton: &Skeleton,
+    stage: &Stage,
+    frame: usize,
+) -> Vec<LinkState> {
     let twists = skeleton.twists(&motion.qpos[frame], &motion.qvel[frame]);
     let poses = &motion.bodies[frame];
     stage
@@ -139,7 +159,11 @@ fn link_states(motion: &Motion, skeleton: &Skeleton, stage: &Stage, frame: usize
 }
 
 fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {
-    let at = a.pose.translation.vector.lerp(&b.pose.translation.vector, blend);
+    let at = a
+        .pose
+        .translation
+        .vector
+        .lerp(&b.pose.translation.vector, blend);
     let (qa, qb) = (a.pose.rotation.coords, b.pose.rotation.coords);
     let near = if qa.dot(&qb) < 0.0 { -qb } else { qb };
     // Frames are close: the normalised mean differs from slerp by less than single precision shows.

@@ -6,8 +6,15 @@ use super::setting::{Rewards, Stage};
 use crate::sim::LinkState;
 
 /// Names of the terms, in the order of [`Terms::values`].
-pub const TERM_NAMES: [&str; 7] =
-    ["pose", "velocity", "position", "root", "root_velocity", "com", "angular_momentum"];
+pub const TERM_NAMES: [&str; 7] = [
+    "pose",
+    "velocity",
+    "position",
+    "root",
+    "root_velocity",
+    "com",
+    "angular_momentum",
+];
 
 /// The terms of one step, each in (0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,7 +38,15 @@ pub struct Terms {
 impl Terms {
     /// In the order of [`TERM_NAMES`].
     pub fn values(&self) -> [f32; 7] {
-        [self.pose, self.velocity, self.position, self.root, self.root_velocity, self.com, self.angular_momentum]
+        [
+            self.pose,
+            self.velocity,
+            self.position,
+            self.root,
+            self.root_velocity,
+            self.com,
+            self.angular_momentum,
+        ]
     }
 
     /// The weighted sum, divided by the sum of the weights: a reward in (0, 1].
@@ -46,12 +61,21 @@ impl Terms {
             weights.angular_momentum,
         ];
         let sum: f32 = w.iter().sum();
-        self.values().iter().zip(w).map(|(value, weight)| value * weight).sum::<f32>() / sum
+        self.values()
+            .iter()
+            .zip(w)
+            .map(|(value, weight)| value * weight)
+            .sum::<f32>()
+            / sum
     }
 }
 
 /// Compares an agent with its reference; link 0 is the root.
-pub fn terms(stage: &Stage, agent: (&[LinkState], &Dynamics), reference: (&[LinkState], &Dynamics)) -> Terms {
+pub fn terms(
+    stage: &Stage,
+    agent: (&[LinkState], &Dynamics),
+    reference: (&[LinkState], &Dynamics),
+) -> Terms {
     let (links, dynamics) = agent;
     let (wanted, wanted_dynamics) = reference;
     let (mut pose, mut velocity, mut position) = (0.0, 0.0, 0.0);
@@ -64,13 +88,18 @@ pub fn terms(stage: &Stage, agent: (&[LinkState], &Dynamics), reference: (&[Link
             pose += mine.angle_to(&other).powi(2);
         }
         velocity += (a.angular - b.angular).norm_squared();
-        position += ((a.pose.translation.vector - root) - (b.pose.translation.vector - wanted_root)).norm_squared();
+        position += ((a.pose.translation.vector - root)
+            - (b.pose.translation.vector - wanted_root))
+            .norm_squared();
     }
     let n = (links.len().max(2) - 1) as f32;
     let (a, b) = (&links[0], &wanted[0]);
-    let root_error = 10.0 * (root - wanted_root).norm_squared() + 2.0 * a.pose.rotation.angle_to(&b.pose.rotation).powi(2);
-    let root_rate = (a.linear - b.linear).norm_squared() + 0.1 * (a.angular - b.angular).norm_squared();
-    let momentum = (dynamics.angular_momentum - wanted_dynamics.angular_momentum) / stage.momentum_scale;
+    let root_error = 10.0 * (root - wanted_root).norm_squared()
+        + 2.0 * a.pose.rotation.angle_to(&b.pose.rotation).powi(2);
+    let root_rate =
+        (a.linear - b.linear).norm_squared() + 0.1 * (a.angular - b.angular).norm_squared();
+    let momentum =
+        (dynamics.angular_momentum - wanted_dynamics.angular_momentum) / stage.momentum_scale;
     Terms {
         pose: (-6.0 * pose / n).exp(),
         velocity: (-0.1 * velocity / n).exp(),

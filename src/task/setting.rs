@@ -56,7 +56,11 @@ pub struct Terminations {
 
 impl Default for Terminations {
     fn default() -> Self {
-        Self { distance: 0.5, fall: true, reward: None }
+        Self {
+            distance: 0.5,
+            fall: true,
+            reward: None,
+        }
     }
 }
 
@@ -114,10 +118,24 @@ impl Stage {
     /// A skeleton that can't be simulated.
     pub fn new(skeleton: Skeleton) -> Result<Self, TaskError> {
         let character = Character::new(&skeleton)?;
-        let ends = [Slot::Head, Slot::LeftHand, Slot::RightHand, Slot::LeftFoot, Slot::RightFoot];
-        let key_bodies = ends.iter().filter_map(|slot| skeleton.slots.get(slot).copied()).collect();
+        let ends = [
+            Slot::Head,
+            Slot::LeftHand,
+            Slot::RightHand,
+            Slot::LeftFoot,
+            Slot::RightFoot,
+        ];
+        let key_bodies = ends
+            .iter()
+            .filter_map(|slot| skeleton.slots.get(slot).copied())
+            .collect();
         let leg = skeleton.leg_length();
         let momentum_scale = (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32;
-        Ok(Stage { skeleton, character, key_bodies, momentum_scale })
+        Ok(Stage {
+            skeleton,
+            character,
+            key_bodies,
+            momentum_scale,
+        })
     }
 }

@@ -37,9 +37,17 @@ pub fn failure(
     if furthest(links, reference) > rules.distance {
         return Some(Failure::Distance);
     }
-    let fell = || contacts.iter().enumerate().any(|(link, touches)| *touches && !allowed.contains(&link));
+    let fell = || {
+        contacts
+            .iter()
+            .enumerate()
+            .any(|(link, touches)| *touches && !allowed.contains(&link))
+    };
     if rules.fall && fell() {
         return Some(Failure::Fall);
     }
-    rules.reward.filter(|least| reward < *least).map(|_| Failure::Reward)
+    rules
+        .reward
+        .filter(|least| reward < *least)
+        .map(|_| Failure::Reward)
 }
