@@ -50,7 +50,12 @@ pub(super) fn align(
         };
         let body_at_source_rest = to * from.inverse() * body_rest[body].rotation;
         let joint_from_body = source_rest[joint].rotation.inverse() * body_at_source_rest;
-        binds.push(Bind { slot, joint, body, joint_from_body });
+        binds.push(Bind {
+            slot,
+            joint,
+            body,
+            joint_from_body,
+        });
     }
     Ok(Alignment { binds, scale })
 }
@@ -58,7 +63,9 @@ pub(super) fn align(
 impl Figure {
     fn new(slots: impl Iterator<Item = (Slot, usize)>, rest: &[Isometry3<f64>]) -> Figure {
         Figure {
-            at: slots.map(|(slot, i)| (slot, rest[i].translation.vector)).collect(),
+            at: slots
+                .map(|(slot, i)| (slot, rest[i].translation.vector))
+                .collect(),
         }
     }
 
@@ -80,7 +87,9 @@ impl Figure {
     /// Horizontal unit vector to the figure's left, from hips and shoulders.
     fn left(&self) -> Option<Vector3<f64>> {
         let hips = self.span(Slot::RightUpperLeg, Slot::LeftUpperLeg)?;
-        let arms = self.span(Slot::RightUpperArm, Slot::LeftUpperArm).unwrap_or(hips);
+        let arms = self
+            .span(Slot::RightUpperArm, Slot::LeftUpperArm)
+            .unwrap_or(hips);
         let across = hips + arms;
         Vector3::new(across.x, across.y, 0.0).try_normalize(1e-9)
     }
@@ -93,17 +102,24 @@ impl Figure {
         let bone = |from: Slot, to: Slot| self.span(from, to)?.try_normalize(1e-9);
         let (along, second) = match slot {
             Slot::Hips | Slot::Spine => (bone(Slot::RightUpperLeg, Slot::LeftUpperLeg)?, up),
-            Slot::Chest | Slot::Neck | Slot::Head => {
-                (bone(Slot::RightUpperArm, Slot::LeftUpperArm).unwrap_or(left), up)
+            Slot::Chest | Slot::Neck | Slot::Head => (
+                bone(Slot::RightUpperArm, Slot::LeftUpperArm).unwrap_or(left),
+                up,
+            ),
+            Slot::LeftFoot | Slot::LeftToes => {
+                (self.toward(Slot::LeftFoot, Slot::LeftToes, forward), up)
             }
-            Slot::LeftFoot | Slot::LeftToes => (self.toward(Slot::LeftFoot, Slot::LeftToes, forward), up),
             Slot::RightFoot | Slot::RightToes => {
                 (self.toward(Slot::RightFoot, Slot::RightToes, forward), up)
             }
             limb => (self.limb_direction(limb)?, forward),
         };
         // An arm held straight forward bends upward.
-        let second = if along.dot(&second).abs() > 0.95 { up } else { second };
+        let second = if along.dot(&second).abs() > 0.95 {
+            up
+        } else {
+            second
+        };
         basis(&along, &second)
     }
 
@@ -141,5 +157,7 @@ fn basis(along: &Vector3<f64>, second: &Vector3<f64>) -> Option<UnitQuaternion<f
     let x = along.try_normalize(1e-9)?;
     let z = x.cross(second).try_normalize(1e-9)?;
     let matrix = Matrix3::from_columns(&[x, z.cross(&x), z]);
-    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
+    Some(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix_unchecked(matrix),
+    ))
 }

@@ -18,7 +18,13 @@ const BLOCK: usize = 3;
 impl Pentadiagonal {
     pub fn new(n: usize, count: usize) -> Pentadiagonal {
         let zeros = || vec![0.0; n * n * count];
-        Pentadiagonal { n, count, diagonal: zeros(), next: zeros(), second: zeros() }
+        Pentadiagonal {
+            n,
+            count,
+            diagonal: zeros(),
+            next: zeros(),
+            second: zeros(),
+        }
     }
 
     pub fn clear(&mut self) {
@@ -107,7 +113,11 @@ fn cholesky(a: &mut [f64], n: usize) -> bool {
     for j in 0..n {
         for i in j..n {
             let (head, tail) = a.split_at(i * n);
-            let row_j = if i == j { &tail[..j] } else { &head[j * n..j * n + j] };
+            let row_j = if i == j {
+                &tail[..j]
+            } else {
+                &head[j * n..j * n + j]
+            };
             let sum = dot(&tail[..j], row_j);
             a[i * n + j] -= sum;
         }
@@ -127,7 +137,12 @@ fn cholesky(a: &mut [f64], n: usize) -> bool {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in a4.zip(b4) {
         for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
             *sum += x * y;
@@ -150,7 +165,10 @@ fn solve_rows(lower: &[f64], b: &mut [f64], n: usize) {
 /// `row` −= Σₖ factorsₖ · (row k of `rows`), four rows at a time.
 fn subtract_rows(row: &mut [f64], rows: &[f64], factors: &[f64], n: usize) {
     let fours = factors.len() / 4 * 4;
-    for (f, four) in factors[..fours].chunks_exact(4).zip(rows.chunks_exact(4 * n)) {
+    for (f, four) in factors[..fours]
+        .chunks_exact(4)
+        .zip(rows.chunks_exact(4 * n))
+    {
         let (a, rest) = four.split_at(n);
         let (b, rest) = rest.split_at(n);
         let (c, d) = rest.split_at(n);
@@ -158,7 +176,10 @@ fn subtract_rows(row: &mut [f64], rows: &[f64], factors: &[f64], n: usize) {
             *x -= f[0] * a + f[1] * b + f[2] * c + f[3] * d;
         }
     }
-    for (f, one) in factors[fours..].iter().zip(rows[fours * n..].chunks_exact(n)) {
+    for (f, one) in factors[fours..]
+        .iter()
+        .zip(rows[fours * n..].chunks_exact(n))
+    {
         add_scaled(row, one, -f);
     }
 }
@@ -168,7 +189,10 @@ fn subtract_product(c: &mut [f64], a: &[f64], b: &[f64], n: usize, reach: usize)
     let fours = n / 4 * 4;
     for k in (0..fours).step_by(4) {
         let width = n.min(k + 3 + reach);
-        let row = |m: &'_ [f64], k: usize| -> usize { debug_assert!(k * n < m.len()); k * n };
+        let row = |m: &'_ [f64], k: usize| -> usize {
+            debug_assert!(k * n < m.len());
+            k * n
+        };
         let (b0, b1) = (&b[row(b, k)..][..width], &b[row(b, k + 1)..][..width]);
         let (b2, b3) = (&b[row(b, k + 2)..][..width], &b[row(b, k + 3)..][..width]);
         for i in 0..n {
@@ -184,7 +208,11 @@ fn subtract_product(c: &mut [f64], a: &[f64], b: &[f64], n: usize, reach: usize)
         let width = n.min(k + reach);
         for i in 0..n {
             let factor = a[k * n + i];
-            add_scaled(&mut c[i * n..i * n + width], &b[k * n..k * n + width], -factor);
+            add_scaled(
+                &mut c[i * n..i * n + width],
+                &b[k * n..k * n + width],
+                -factor,
+            );
         }
     }
 }
@@ -198,7 +226,9 @@ mod tests {
     fn system(n: usize, count: usize) -> (Pentadiagonal, DMatrix<f64>) {
         let mut seed = 7_u64;
         let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            seed = seed
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (seed >> 33) as f64 / (1_u64 << 31) as f64 - 0.5
         };
         let mut dense = DMatrix::<f64>::identity(n * count, n * count);
@@ -220,7 +250,11 @@ mod tests {
         }
         let mut blocks = Pentadiagonal::new(n, count);
         for f in 0..count {
-            for (ahead, to) in [(0, &mut blocks.diagonal), (1, &mut blocks.next), (2, &mut blocks.second)] {
+            for (ahead, to) in [
+                (0, &mut blocks.diagonal),
+                (1, &mut blocks.next),
+                (2, &mut blocks.second),
+            ] {
                 if f + ahead < count {
                     let view = dense.view((f * n, (f + ahead) * n), (n, n));
                     for r in 0..n {
@@ -251,7 +285,9 @@ mod tests {
     #[test]
     fn an_indefinite_matrix_is_refused() {
         let mut blocks = Pentadiagonal::new(2, 2);
-        blocks.diagonal.copy_from_slice(&[1.0, 0.0, 2.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
+        blocks
+            .diagonal
+            .copy_from_slice(&[1.0, 0.0, 2.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
         assert!(!blocks.factor());
     }
 }

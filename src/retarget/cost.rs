@@ -103,7 +103,9 @@ impl Problem<'_> {
             let r = log(&(goal.inverse() * rotation));
             let into_body = rotation.inverse().to_rotation_matrix();
             let derivative = right_jacobian_inverse(&r) * into_body.matrix();
-            let turning = self.model.chains[turn.body].iter().filter(|dof| self.model.turns[**dof]);
+            let turning = self.model.chains[turn.body]
+                .iter()
+                .filter(|dof| self.model.turns[**dof]);
             columns.clear();
             columns.extend(turning.map(|dof| (*dof, derivative * pose.axes[*dof])));
             cost += to.add(columns, &r, turn.weight);
@@ -129,7 +131,9 @@ impl Problem<'_> {
             let below = at.z - knob.radius;
             if below < 0.0 {
                 self.levers(knob.body, pose, &at, columns);
-                columns.iter_mut().for_each(|(_, lever)| *lever = Vector3::new(0.0, 0.0, lever.z));
+                columns
+                    .iter_mut()
+                    .for_each(|(_, lever)| *lever = Vector3::new(0.0, 0.0, lever.z));
                 cost += to.add(columns, &Vector3::new(0.0, 0.0, below), weight::GROUND);
             }
         }
@@ -140,7 +144,12 @@ impl Problem<'_> {
     fn joints(&self, f: usize, qpos: &[f64], columns: &mut Columns, to: &mut Normal) -> f64 {
         let guess = &self.goals.guess[f];
         let mut cost = 0.0;
-        let mut turned = |to: &mut Normal, v: &Vector3<f64>, r: &Vector3<f64>, dof: usize, weight: f64, rows: [bool; 3]| {
+        let mut turned = |to: &mut Normal,
+                          v: &Vector3<f64>,
+                          r: &Vector3<f64>,
+                          dof: usize,
+                          weight: f64,
+                          rows: [bool; 3]| {
             let mut derivative = right_jacobian_inverse(v);
             for (i, row) in rows.iter().enumerate() {
                 if !row {
@@ -155,11 +164,16 @@ impl Problem<'_> {
             match joint.kind {
                 JointKind::Free => {}
                 JointKind::Ball => {
-                    let off = log(&(quaternion(guess, joint.qpos).inverse() * quaternion(qpos, joint.qpos)));
+                    let off =
+                        log(&(quaternion(guess, joint.qpos).inverse()
+                            * quaternion(qpos, joint.qpos)));
                     cost += turned(to, &off, &off, joint.dof, weight::GUESS, [true; 3]);
                     let (v, _) = limits::ball(joint, qpos);
                     let r = Vector3::from_fn(|i, _| {
-                        joint.limits.get(i).map_or(0.0, |range| limits::outside(v[i], within(*range)))
+                        joint
+                            .limits
+                            .get(i)
+                            .map_or(0.0, |range| limits::outside(v[i], within(*range)))
                     });
                     if r != Vector3::zeros() {
                         let rows = [r.x != 0.0, r.y != 0.0, r.z != 0.0];
@@ -200,15 +214,44 @@ pub(super) struct Part {
 pub(super) fn parts(model: &Model) -> Vec<Part> {
     let mut parts = Vec::new();
     for joint in model.joints() {
-        let (dof, shift, turn) = (joint.dof, weight::SHIFT_ACCELERATION, weight::TURN_ACCELERATION);
+        let (dof, shift, turn) = (
+            joint.dof,
+            weight::SHIFT_ACCELERATION,
+            weight::TURN_ACCELERATION,
+        );
         match joint.kind {
             JointKind::Free => {
-                parts.push(Part { dof, size: 3, turns: false, weight: shift });
-                parts.push(Part { dof: dof + 3, size: 3, turns: true, weight: turn });
+                parts.push(Part {
+                    dof,
+                    size: 3,
+                    turns: false,
+                    weight: shift,
+                });
+                parts.push(Part {
+                    dof: dof + 3,
+                    size: 3,
+                    turns: true,
+                    weight: turn,
+                });
             }
-            JointKind::Ball => parts.push(Part { dof, size: 3, turns: true, weight: turn }),
-            JointKind::Hinge(_) => parts.push(Part { dof, size: 1, turns: false, weight: turn }),
-            JointKind::Slide(_) => parts.push(Part { dof, size: 1, turns: false, weight: shift }),
+            JointKind::Ball => parts.push(Part {
+                dof,
+                size: 3,
+                turns: true,
+                weight: turn,
+            }),
+            JointKind::Hinge(_) => parts.push(Part {
+                dof,
+                size: 1,
+                turns: false,
+                weight: turn,
+            }),
+            JointKind::Slide(_) => parts.push(Part {
+                dof,
+                size: 1,
+                turns: false,
+                weight: shift,
+            }),
         }
     }
     parts
@@ -222,15 +265,22 @@ pub(super) struct Bend {
 
 /// Second difference of a part from the steps into and out of a frame (tangent vectors).
 pub(super) fn bend(part: &Part, into: &[f64], out: &[f64]) -> Bend {
-    let pick = |v: &[f64]| {
-        Vector3::from_fn(|i, _| if i < part.size { v[part.dof + i] } else { 0.0 })
-    };
+    let pick =
+        |v: &[f64]| Vector3::from_fn(|i, _| if i < part.size { v[part.dof + i] } else { 0.0 });
     let (into, out) = (pick(into), pick(out));
     let by = if part.turns {
         let left = |v: &Vector3<f64>| right_jacobian_inverse(&-v);
-        [left(&into), -left(&out) - right_jacobian_inverse(&into), right_jacobian_inverse(&out)]
+        [
+            left(&into),
+            -left(&out) - right_jacobian_inverse(&into),
+            right_jacobian_inverse(&out),
+        ]
     } else {
-        [Matrix3::identity(), Matrix3::identity() * -2.0, Matrix3::identity()]
+        [
+            Matrix3::identity(),
+            Matrix3::identity() * -2.0,
+            Matrix3::identity(),
+        ]
     };
     Bend { r: out - into, by }
 }

@@ -13,7 +13,10 @@ pub(super) struct Move {
     pub turn: f64,
 }
 
-const NONE: Move = Move { shift: Vector3::new(0.0, 0.0, 0.0), turn: 0.0 };
+const NONE: Move = Move {
+    shift: Vector3::new(0.0, 0.0, 0.0),
+    turn: 0.0,
+};
 
 /// Sum of weights from which on a limb counts as standing.
 const STANDS: f64 = 0.25;
@@ -28,8 +31,15 @@ const WINDOW: f64 = 0.05;
 
 /// The move of every frame, for a limb whose key is at `keys[f]` and whose knobs `held[f]` stand.
 pub(super) fn moves(held: &[Vec<Held>], keys: &[Vector3<f64>], fps: f64) -> Vec<Move> {
-    let fitted: Vec<Option<Move>> = held.iter().zip(keys).map(|(held, key)| fit(held, key)).collect();
-    smooth(&bridge(&fitted, FADE * fps), (WINDOW * fps).round() as usize)
+    let fitted: Vec<Option<Move>> = held
+        .iter()
+        .zip(keys)
+        .map(|(held, key)| fit(held, key))
+        .collect();
+    smooth(
+        &bridge(&fitted, FADE * fps),
+        (WINDOW * fps).round() as usize,
+    )
 }
 
 /// The turn about Z and shift that bring the standing knobs nearest to their anchors (weighted least squares).
@@ -50,20 +60,30 @@ fn fit(held: &[Held], key: &Vector3<f64>) -> Option<Move> {
         spread += h.weight * a.norm_squared();
     }
     let tells = spread > total * APART * APART;
-    let turn = if tells { sin.atan2(cos).clamp(-LARGEST_TURN, LARGEST_TURN) } else { 0.0 };
+    let turn = if tells {
+        sin.atan2(cos).clamp(-LARGEST_TURN, LARGEST_TURN)
+    } else {
+        0.0
+    };
     let moved = to + exp(&(Vector3::z() * turn)) * (key - from);
-    Some(Move { shift: moved - key, turn })
+    Some(Move {
+        shift: moved - key,
+        turn,
+    })
 }
 
 /// Fills the frames outside of stances with the moves of the stances before and after, each fading with time.
 fn bridge(fitted: &[Option<Move>], fade: f64) -> Vec<Move> {
     let ahead = nearest(fitted.iter().rev());
-    let around = nearest(fitted.iter()).into_iter().zip(ahead.into_iter().rev());
+    let around = nearest(fitted.iter())
+        .into_iter()
+        .zip(ahead.into_iter().rev());
     let fading = |away: usize| {
         let t = (1.0 - away as f64 / fade).max(0.0);
         t * t * (3.0 - 2.0 * t)
     };
-    let part = |found: Option<(usize, Move)>| found.map_or((0.0, NONE), |(away, by)| (fading(away), by));
+    let part =
+        |found: Option<(usize, Move)>| found.map_or((0.0, NONE), |(away, by)| (fading(away), by));
     let bridged = around.map(|(before, after)| {
         let ((a, before), (b, after)) = (part(before), part(after));
         let total = (a + b).max(1.0);
@@ -79,7 +99,9 @@ fn bridge(fitted: &[Option<Move>], fade: f64) -> Vec<Move> {
 fn nearest<'a>(fitted: impl Iterator<Item = &'a Option<Move>>) -> Vec<Option<(usize, Move)>> {
     let mut last = None;
     let mut step = |found: &Option<Move>| {
-        last = found.map(|by| (0, by)).or(last.map(|(away, by)| (away + 1, by)));
+        last = found
+            .map(|by| (0, by))
+            .or(last.map(|(away, by)| (away + 1, by)));
         last
     };
     fitted.map(&mut step).collect()
@@ -95,7 +117,10 @@ fn smooth(moves: &[Move], half: usize) -> Vec<Move> {
             sum.turn += moves[g].turn * weight;
             total += weight;
         }
-        Move { shift: sum.shift / total, turn: sum.turn / total }
+        Move {
+            shift: sum.shift / total,
+            turn: sum.turn / total,
+        }
     };
     (0..moves.len()).map(mean).collect()
 }

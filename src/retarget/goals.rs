@@ -70,11 +70,25 @@ impl Goals {
         let keys: Vec<Key> = Slot::ALL
             .into_iter()
             .filter(|slot| weights(*slot).0 > 0.0 && map.joint(*slot).is_some())
-            .filter_map(|slot| Some(Key { slot, body: slot_body(slot)?, weight: weights(slot).0 }))
+            .filter_map(|slot| {
+                Some(Key {
+                    slot,
+                    body: slot_body(slot)?,
+                    weight: weights(slot).0,
+                })
+            })
             .collect();
         let turning = |body: usize| !model.chains[body].is_empty();
         let turns: Vec<(usize, Turn)> = (alignment.binds.iter().enumerate())
-            .map(|(i, bind)| (i, Turn { body: bind.body, weight: weights(bind.slot).1 }))
+            .map(|(i, bind)| {
+                (
+                    i,
+                    Turn {
+                        body: bind.body,
+                        weight: weights(bind.slot).1,
+                    },
+                )
+            })
             .filter(|(_, turn)| turn.weight > 0.0 && turning(turn.body))
             .filter(|(_, turn)| !skeleton.bodies[turn.body].joints.is_empty())
             .collect();
@@ -90,7 +104,9 @@ impl Goals {
             let source = clip.world(f);
             let rotations = builder.rotations(&source);
             let (qpos, bodies) = builder.guess(&source, &rotations, goals.guess.last());
-            goals.points.push(builder.points(&goals.keys, &source, &bodies));
+            goals
+                .points
+                .push(builder.points(&goals.keys, &source, &bodies));
             let chosen = turns.iter().map(|(i, _)| rotations[*i]);
             goals.rotations.push(chosen.collect());
             goals.guess.push(qpos);
@@ -143,13 +159,24 @@ impl<'a> Builder<'a> {
             bind_of[bind.body] = Some(i);
         }
         let rest = skeleton.forward(&skeleton.rest_qpos());
-        let hip = |slot: Slot| skeleton.slots.get(&slot).map(|b| rest[*b].translation.vector);
+        let hip = |slot: Slot| {
+            skeleton
+                .slots
+                .get(&slot)
+                .map(|b| rest[*b].translation.vector)
+        };
         let middle = match (hip(Slot::LeftUpperLeg), hip(Slot::RightUpperLeg)) {
             (Some(left), Some(right)) => (left + right) / 2.0,
             _ => rest[0].translation.vector,
         };
         let hip_middle = (rest[0].inverse() * nalgebra::Point3::from(middle)).coords;
-        Builder { map, alignment, skeleton, bind_of, hip_middle }
+        Builder {
+            map,
+            alignment,
+            skeleton,
+            bind_of,
+            hip_middle,
+        }
     }
 
     /// Scaled position of a slot's joint.
@@ -175,7 +202,9 @@ impl<'a> Builder<'a> {
             (Some(left), Some(right)) => (left + right) / 2.0,
             _ => hips(Slot::Hips).unwrap_or_else(Vector3::zeros),
         };
-        let facing = self.goal(0, rotations).unwrap_or_else(UnitQuaternion::identity);
+        let facing = self
+            .goal(0, rotations)
+            .unwrap_or_else(UnitQuaternion::identity);
         let root = Isometry3::from_parts((middle - facing * self.hip_middle).into(), facing);
         let bodies = &self.skeleton.bodies;
         let mut world: Vec<UnitQuaternion<f64>> = vec![facing; bodies.len()];
@@ -194,7 +223,9 @@ impl<'a> Builder<'a> {
                 (parent * body.rest.rotation).inverse() * world[b]
             };
             let turns: Vec<UnitQuaternion<f64>> = (0..bodies.len()).map(local).collect();
-            qpos = self.skeleton.rotations_to_qpos(&root, &turns, before.map(Vec::as_slice));
+            qpos = self
+                .skeleton
+                .rotations_to_qpos(&root, &turns, before.map(Vec::as_slice));
             reached = self.skeleton.forward(&qpos);
             for b in 1..bodies.len() {
                 let hinged = bodies[b].joints.len() == 1 || bodies[b].joints.is_empty();
@@ -255,7 +286,11 @@ impl<'a> Builder<'a> {
 
     /// The skeleton's bone from one slot to the next in the source's direction.
     fn bone(&self, source: &[Isometry3<f64>], from: Slot, to: Slot) -> Option<Vector3<f64>> {
-        let body = self.skeleton.slots.get(&to).map(|b| &self.skeleton.bodies[*b])?;
+        let body = self
+            .skeleton
+            .slots
+            .get(&to)
+            .map(|b| &self.skeleton.bodies[*b])?;
         let direction = self.source_point(source, to)? - self.source_point(source, from)?;
         Some(direction.try_normalize(1e-9)? * body.rest.translation.vector.norm())
     }

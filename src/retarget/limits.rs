@@ -25,7 +25,12 @@ pub(super) fn outside(value: f64, [low, high]: [f64; 2]) -> f64 {
 pub(super) fn ball(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
     let short = log(&quaternion(qpos, joint.qpos));
     let excess = |v: &Vector3<f64>| {
-        Vector3::from_fn(|i, _| joint.limits.get(i).map_or(0.0, |range| outside(v[i], *range)))
+        Vector3::from_fn(|i, _| {
+            joint
+                .limits
+                .get(i)
+                .map_or(0.0, |range| outside(v[i], *range))
+        })
     };
     let beyond = excess(&short);
     let angle = short.norm();
@@ -40,7 +45,10 @@ pub(super) fn ball(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) 
 }
 
 fn slack(joint: &Joint, qpos: &[f64]) -> f64 {
-    joint.limits.first().map_or(0.0, |range| outside(qpos[joint.qpos], *range))
+    joint
+        .limits
+        .first()
+        .map_or(0.0, |range| outside(qpos[joint.qpos], *range))
 }
 
 /// Number of degrees of freedom outside of their range.
@@ -48,8 +56,14 @@ pub(super) fn violations(skeleton: &Skeleton, qpos: &[f64]) -> usize {
     let joints = skeleton.bodies.iter().flat_map(|body| &body.joints);
     let count = |joint: &Joint| match joint.kind {
         JointKind::Free => 0,
-        JointKind::Ball => ball(joint, qpos).1.iter().filter(|x| x.abs() > ROUNDING).count(),
-        JointKind::Hinge(_) | JointKind::Slide(_) => usize::from(slack(joint, qpos).abs() > ROUNDING),
+        JointKind::Ball => ball(joint, qpos)
+            .1
+            .iter()
+            .filter(|x| x.abs() > ROUNDING)
+            .count(),
+        JointKind::Hinge(_) | JointKind::Slide(_) => {
+            usize::from(slack(joint, qpos).abs() > ROUNDING)
+        }
     };
     joints.map(count).sum()
 }

@@ -16,6 +16,7 @@ mod rotation;
 mod seam;
 mod solve;
 mod stance;
+mod travel;
 
 pub use report::{MappedJoint, Report, Spread};
 
@@ -42,19 +43,38 @@ pub struct Options {
 pub enum RetargetError {
     #[error("clip `{clip}` is no humanoid: {reason}")]
     NotHumanoid { clip: String, reason: NotHumanoid },
-    #[error("the joint map puts joint number {joint} in slot `{slot}`, but the clip has only {count}")]
-    NoSuchJoint { slot: humanoid::Slot, joint: usize, count: usize },
+    #[error(
+        "the joint map puts joint number {joint} in slot `{slot}`, but the clip has only {count}"
+    )]
+    NoSuchJoint {
+        slot: humanoid::Slot,
+        joint: usize,
+        count: usize,
+    },
     #[error("clip `{clip}` has no frames")]
     Empty { clip: String },
     #[error("clip `{clip}` has a value that is no finite number at frame {frame}, joint `{joint}`")]
-    NotFinite { clip: String, frame: usize, joint: String },
+    NotFinite {
+        clip: String,
+        frame: usize,
+        joint: String,
+    },
     #[error("clip `{clip}` has a frame rate of {fps} Hz; give it a positive one")]
     FrameRate { clip: String, fps: f64 },
     #[error("clip `{clip}` has {found} joint transforms at frame {frame} for {expected} joints")]
-    Ragged { clip: String, frame: usize, found: usize, expected: usize },
-    #[error("the source's legs have no length in its rest pose, or a map without both legs was given")]
+    Ragged {
+        clip: String,
+        frame: usize,
+        found: usize,
+        expected: usize,
+    },
+    #[error(
+        "the source's legs have no length in its rest pose, or a map without both legs was given"
+    )]
     NoSourceLegs,
-    #[error("the skeleton has no slots for both legs; name its bodies in a JSON file beside the MJCF")]
+    #[error(
+        "the skeleton has no slots for both legs; name its bodies in a JSON file beside the MJCF"
+    )]
     NoLegs,
     #[error("skeleton `{skeleton}` doesn't hang on one free joint")]
     NoFreeRoot { skeleton: String },
@@ -76,7 +96,11 @@ pub struct Retargeted {
 ///
 /// # Errors
 /// [`RetargetError`] when the clip is no humanoid or malformed, or the skeleton lacks legs.
-pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<Retargeted, RetargetError> {
+pub fn retarget(
+    clip: &Clip,
+    skeleton: &Skeleton,
+    options: &Options,
+) -> Result<Retargeted, RetargetError> {
     let start = Instant::now();
     check(clip, skeleton)?;
     let map = joint_map(clip, options)?;
@@ -84,17 +108,28 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
     let model = Model::new(skeleton);
     let mut goals = Goals::new(clip, &map, &alignment, &model);
     let leg = skeleton.leg_length();
-    let ground = stance::ground(&model, &goals, clip.fps, leg, clip.loop_mode);
+    let mut problems = clip.problems.clone();
+    if clip.loop_mode == LoopMode::Wrap {
+        problems.extend(travel::restore(&mut goals, &model, clip.fps, leg));
+    }
+    let soles = stance::soles(&model, &goals);
+    let ground = stance::ground(&soles, clip.fps, leg, clip.loop_mode);
     let root = goals.root(0);
     goals.shift(&Vector3::new(-root.x, -root.y, -ground));
     let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
     let cycle = wraps.then(|| seam::cycle(&goals, &model));
     let faithful = goals.clone();
     if let Some(cycle) = &cycle {
+        problems.extend(seam::gap_problem(&goals, &model));
         seam::close(&mut goals, cycle, &model, clip.fps);
     }
     let anchors = stance::plant(&model, &mut goals, clip.fps, leg, cycle.as_ref());
-    let problem = Problem { model: &model, goals: &goals, anchors: &anchors, fps: clip.fps };
+    let problem = Problem {
+        model: &model,
+        goals: &goals,
+        anchors: &anchors,
+        fps: clip.fps,
+    };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
     let contact_bodies = stance::contact_bodies(&model, &goals, &anchors);
     let mut motion = Motion::from_poses(
@@ -102,7 +137,11 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
         Draft {
             name: clip.name.clone(),
             fps: clip.fps,
-            loop_mode: if wraps { LoopMode::Wrap } else { LoopMode::Clamp },
+            loop_mode: if wraps {
+                LoopMode::Wrap
+            } else {
+                LoopMode::Clamp
+            },
             cycle: cycle.unwrap_or(STILL),
             qpos,
             contact: Some(stance::contact(&model, &anchors, &contact_bodies)),
@@ -110,15 +149,29 @@ pub fn retarget(clip: &Clip, skeleton: &Skeleton, options: &Options) -> Result<R
             report: serde_json::Value::Null,
         },
     );
-    let report = report::report(&model, &faithful, &motion, report::mapped(clip, &map), clip.problems.clone());
+    let report = report::report(
+        &model,
+        &faithful,
+        &motion,
+        report::mapped(clip, &map),
+        problems,
+    );
     motion.report = serde_json::to_value(&report).unwrap_or_default();
-    Ok(Retargeted { motion, report, seconds: start.elapsed().as_secs_f64(), iterations })
+    Ok(Retargeted {
+        motion,
+        report,
+        seconds: start.elapsed().as_secs_f64(),
+        iterations,
+    })
 }
 
 /// Fewest steps in a cycle; a clip with fewer ends where it ends.
 const SHORTEST_CYCLE: usize = 4;
 
-const STILL: Cycle = Cycle { translation: Vector3::new(0.0, 0.0, 0.0), heading: 0.0 };
+const STILL: Cycle = Cycle {
+    translation: Vector3::new(0.0, 0.0, 0.0),
+    heading: 0.0,
+};
 
 /// Fits the trajectory and brings it inside the joint limits.
 fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
@@ -141,12 +194,18 @@ fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
 fn joint_map(clip: &Clip, options: &Options) -> Result<HumanoidMap, RetargetError> {
     let map = match &options.map {
         Some(map) => map.clone(),
-        None => humanoid::map(&clip.joints)
-            .map_err(|reason| RetargetError::NotHumanoid { clip: clip.name.clone(), reason })?,
+        None => humanoid::map(&clip.joints).map_err(|reason| RetargetError::NotHumanoid {
+            clip: clip.name.clone(),
+            reason,
+        })?,
     };
     let count = clip.joints.len();
     match map.matches.iter().find(|(_, found)| found.joint >= count) {
-        Some((&slot, found)) => Err(RetargetError::NoSuchJoint { slot, joint: found.joint, count }),
+        Some((&slot, found)) => Err(RetargetError::NoSuchJoint {
+            slot,
+            joint: found.joint,
+            count,
+        }),
         None => Ok(map),
     }
 }
@@ -158,27 +217,51 @@ fn check(clip: &Clip, skeleton: &Skeleton) -> Result<(), RetargetError> {
         return Err(RetargetError::Empty { clip: name() });
     }
     if !clip.fps.is_finite() || clip.fps <= 0.0 {
-        return Err(RetargetError::FrameRate { clip: name(), fps: clip.fps });
+        return Err(RetargetError::FrameRate {
+            clip: name(),
+            fps: clip.fps,
+        });
     }
     let rest = std::iter::once(clip.joints.iter().map(|j| j.rest).collect::<Vec<_>>());
     for (frame, transforms) in rest.chain(clip.frames.iter().cloned()).enumerate() {
         let (found, expected) = (transforms.len(), clip.joints.len());
         if found != expected {
-            return Err(RetargetError::Ragged { clip: name(), frame: frame.saturating_sub(1), found, expected });
+            return Err(RetargetError::Ragged {
+                clip: name(),
+                frame: frame.saturating_sub(1),
+                found,
+                expected,
+            });
         }
         let finite = |t: &nalgebra::Isometry3<f64>| {
-            t.translation.vector.iter().chain(t.rotation.coords.iter()).all(|x| x.is_finite())
+            t.translation
+                .vector
+                .iter()
+                .chain(t.rotation.coords.iter())
+                .all(|x| x.is_finite())
         };
         if let Some(j) = transforms.iter().position(|t| !finite(t)) {
             let joint = clip.joints[j].name.clone();
-            return Err(RetargetError::NotFinite { clip: name(), frame: frame.saturating_sub(1), joint });
+            return Err(RetargetError::NotFinite {
+                clip: name(),
+                frame: frame.saturating_sub(1),
+                joint,
+            });
         }
     }
     let root = skeleton.bodies.first().map(|body| &body.joints[..]);
-    let frees = skeleton.bodies.iter().flat_map(|b| &b.joints).filter(|j| j.kind == JointKind::Free);
+    let frees = skeleton
+        .bodies
+        .iter()
+        .flat_map(|b| &b.joints)
+        .filter(|j| j.kind == JointKind::Free);
     match root {
-        Some([joint]) if joint.kind == JointKind::Free && joint.qpos == 0 && frees.count() == 1 => Ok(()),
-        _ => Err(RetargetError::NoFreeRoot { skeleton: skeleton.name.clone() }),
+        Some([joint]) if joint.kind == JointKind::Free && joint.qpos == 0 && frees.count() == 1 => {
+            Ok(())
+        }
+        _ => Err(RetargetError::NoFreeRoot {
+            skeleton: skeleton.name.clone(),
+        }),
     }
 }
 

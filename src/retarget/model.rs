@@ -62,7 +62,12 @@ impl<'a> Model<'a> {
             chains.push(chain);
             knobs.extend(body.shapes.iter().flat_map(|shape| shape_knobs(b, shape)));
         }
-        Model { skeleton, chains, turns, knobs }
+        Model {
+            skeleton,
+            chains,
+            turns,
+            knobs,
+        }
     }
 
     pub fn joints(&self) -> impl Iterator<Item = &'a Joint> {
@@ -105,7 +110,9 @@ impl<'a> Model<'a> {
     /// Places one body, whose parent is placed.
     pub fn evaluate_body(&self, b: usize, qpos: &[f64], pose: &mut Pose) {
         let body = &self.skeleton.bodies[b];
-        let parent = body.parent.map_or_else(Isometry3::identity, |p| pose.bodies[p]);
+        let parent = body
+            .parent
+            .map_or_else(Isometry3::identity, |p| pose.bodies[p]);
         let mut at = parent * body.rest;
         for joint in &body.joints {
             at = place(joint, &at, qpos, pose);
@@ -177,9 +184,11 @@ fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) 
             }
             return Isometry3::from_parts(at.into(), turn);
         }
-        JointKind::Slide(axis) => {
-            (before * Translation3::from(axis * qpos[q]), [before.rotation * axis; 3], 1)
-        }
+        JointKind::Slide(axis) => (
+            before * Translation3::from(axis * qpos[q]),
+            [before.rotation * axis; 3],
+            1,
+        ),
         JointKind::Hinge(axis) => {
             let turn = UnitQuaternion::from_axis_angle(&Unit::new_unchecked(axis), qpos[q]);
             (turned(before, joint, turn), [before.rotation * axis; 3], 1)
@@ -207,17 +216,29 @@ fn turned(before: &Isometry3<f64>, joint: &Joint, turn: UnitQuaternion<f64>) -> 
 fn shape_knobs(body: usize, shape: &Shape) -> Vec<Knob> {
     match shape {
         Shape::Sphere { center, radius } => {
-            vec![Knob { body, center: *center, radius: *radius }]
+            vec![Knob {
+                body,
+                center: *center,
+                radius: *radius,
+            }]
         }
-        Shape::Capsule { a, b, radius } => {
-            [a, b].map(|end| Knob { body, center: *end, radius: *radius }).into()
-        }
+        Shape::Capsule { a, b, radius } => [a, b]
+            .map(|end| Knob {
+                body,
+                center: *end,
+                radius: *radius,
+            })
+            .into(),
         Shape::Box { pose, half } => (0..8)
             .map(|i: usize| {
                 let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
                 let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
                 let center = (pose * nalgebra::Point3::from(corner)).coords;
-                Knob { body, center, radius: 0.0 }
+                Knob {
+                    body,
+                    center,
+                    radius: 0.0,
+                }
             })
             .collect(),
     }

@@ -12,7 +12,11 @@ pub(super) fn log(q: &UnitQuaternion<f64>) -> Vector3<f64> {
     let (w, v) = (q.w * sign, q.imag() * sign);
     let sine = v.norm();
     // atan(s/w)/s → 1/w for small angles.
-    let factor = if sine < 1e-9 { 2.0 / w } else { 2.0 * sine.atan2(w) / sine };
+    let factor = if sine < 1e-9 {
+        2.0 / w
+    } else {
+        2.0 * sine.atan2(w) / sine
+    };
     v * factor
 }
 

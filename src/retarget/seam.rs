@@ -3,11 +3,14 @@
 use super::goals::Goals;
 use super::model::Model;
 use super::rotation::{exp, heading, log};
+use crate::clip::{Problem, Severity};
 use crate::motion::Cycle;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// A cycle that turns less than this goes straight, radians (1°).
 const STRAIGHT: f64 = 0.0175;
+/// Gap that is told of, radians (6°).
+const NOTICEABLE: f64 = 0.1;
 /// Time on either side of the seam over which its gap is spread, s.
 const SPREAD: f64 = 0.25;
 /// The same as a part of the cycle; the smaller counts.
@@ -24,7 +27,10 @@ pub(super) fn cycle(goals: &Goals, model: &Model) -> Cycle {
     }
     let mut translation = goals.root(last) - exp(&(Vector3::z() * angle)) * goals.root(0);
     translation.z = 0.0;
-    Cycle { translation, heading: angle }
+    Cycle {
+        translation,
+        heading: angle,
+    }
 }
 
 /// Greatest angle between a joint in the first frame and the last.
@@ -35,9 +41,27 @@ fn joint_gap(goals: &Goals, model: &Model) -> f64 {
     }
     let joints = model.joints().skip(1);
     let angle = |joint: &crate::skeleton::Joint| {
-        gap[joint.dof..joint.dof + joint.kind.nv()].iter().map(|x| x * x).sum::<f64>().sqrt()
+        gap[joint.dof..joint.dof + joint.kind.nv()]
+            .iter()
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt()
     };
     joints.map(angle).fold(0.0, f64::max)
+}
+
+/// Tells of a loop that doesn't close.
+pub(super) fn gap_problem(goals: &Goals, model: &Model) -> Option<Problem> {
+    let gap = joint_gap(goals, model);
+    (gap > NOTICEABLE).then(|| Problem {
+        id: "loop-gap".to_owned(),
+        severity: Severity::Warning,
+        message: format!(
+            "the loop doesn't close: a joint is {:.0}° off where the last frame meets the first; the gap was spread over \
+             the frames around it. Import it with `--loop clamp` if it isn't meant to repeat",
+            gap.to_degrees()
+        ),
+    })
 }
 
 /// Closes the loop of the goals: half of the gap is faded into the frames after the seam, half into those before.
@@ -51,15 +75,33 @@ pub(super) fn close(goals: &mut Goals, cycle: &Cycle, model: &Model, fps: f64) {
     let turns: Vec<Vector3<f64>> = (goals.rotations[0].iter().zip(&goals.rotations[last]))
         .map(|(first, last)| log(&(last.inverse() * turn * first)))
         .collect();
-    let carried = super::solve::carried(&goals.guess[0], turn.to_rotation_matrix().matrix(), &cycle.translation);
+    let carried = super::solve::carried(
+        &goals.guess[0],
+        turn.to_rotation_matrix().matrix(),
+        &cycle.translation,
+    );
     let mut joints = vec![0.0; model.skeleton.nv];
     model.difference(&goals.guess[last], &carried, &mut joints);
     let spread = ((SPREAD * fps).min(SHARE * last as f64).round() as usize).clamp(1, last / 2);
     for away in 0..=spread {
         let left = 1.0 - away as f64 / (spread + 1) as f64;
         let half = 0.5 * left * left * (3.0 - 2.0 * left);
-        bend(goals, last - away, half, (&gaps, &turns, &joints), &UnitQuaternion::identity(), model);
-        bend(goals, away, -half, (&gaps, &turns, &joints), &turn.inverse(), model);
+        bend(
+            goals,
+            last - away,
+            half,
+            (&gaps, &turns, &joints),
+            &UnitQuaternion::identity(),
+            model,
+        );
+        bend(
+            goals,
+            away,
+            -half,
+            (&gaps, &turns, &joints),
+            &turn.inverse(),
+            model,
+        );
     }
 }
 

@@ -90,12 +90,21 @@ impl<'a> Solver<'a> {
     }
 
     /// The frames after a damped Gauss–Newton step. Uses the system up.
-    fn trial(&self, frames: &[Vec<f64>], system: &mut System, damping: f64) -> Option<Vec<Vec<f64>>> {
+    fn trial(
+        &self,
+        frames: &[Vec<f64>],
+        system: &mut System,
+        damping: f64,
+    ) -> Option<Vec<Vec<f64>>> {
         let (n, count) = (self.n, frames.len());
         let size = n * n;
         let diagonal = |f: usize, i: usize| f * size + i * n + i;
         let total: f64 = (0..count)
-            .map(|f| (0..n).map(|i| system.band.diagonal[diagonal(f, i)]).sum::<f64>())
+            .map(|f| {
+                (0..n)
+                    .map(|i| system.band.diagonal[diagonal(f, i)])
+                    .sum::<f64>()
+            })
             .sum();
         let added = damping * total / (n * count) as f64;
         for f in 0..count {
@@ -115,7 +124,11 @@ impl<'a> Solver<'a> {
         for (qpos, step) in trial.iter_mut().zip(x.chunks_exact(n)) {
             self.problem.model.step(qpos, step);
         }
-        trial.iter().flatten().all(|v| v.is_finite()).then_some(trial)
+        trial
+            .iter()
+            .flatten()
+            .all(|v| v.is_finite())
+            .then_some(trial)
     }
 
     /// Brings the couplings across the seam into the solution `x` of the band M: with the couplings C, x ← M⁻¹(b − C x)
@@ -166,7 +179,9 @@ impl<'a> Solver<'a> {
         for pair in frames.windows(2) {
             add(&pair[0], &pair[1]);
         }
-        if let (Some((turn, shift)), Some(first), Some(last)) = (self.cycle, frames.first(), frames.last()) {
+        if let (Some((turn, shift)), Some(first), Some(last)) =
+            (self.cycle, frames.first(), frames.last())
+        {
             add(last, &carried(first, &turn, &shift));
         }
         steps
@@ -178,7 +193,11 @@ impl<'a> Solver<'a> {
         let steps = self.steps(frames);
         let mut cost = 0.0;
         let rate = self.problem.fps * self.problem.fps;
-        let range = if self.cycle.is_some() { 0..count } else { 1..count.saturating_sub(1) };
+        let range = if self.cycle.is_some() {
+            0..count
+        } else {
+            1..count.saturating_sub(1)
+        };
         for f in range {
             let at = [(f + count - 1) % count, f, (f + 1) % count];
             for part in &self.parts {
@@ -202,7 +221,14 @@ impl<'a> Solver<'a> {
     }
 
     /// At the seam the root's shift is seen from the cycle that frame `f` is in.
-    fn carry(&self, part: &Part, f: usize, count: usize, steps: &[Vec<f64>], bend: &mut super::cost::Bend) {
+    fn carry(
+        &self,
+        part: &Part,
+        f: usize,
+        count: usize,
+        steps: &[Vec<f64>],
+        bend: &mut super::cost::Bend,
+    ) {
         let Some((turn, _)) = self.cycle.filter(|_| !part.turns && part.size == 3) else {
             return;
         };
@@ -218,7 +244,13 @@ impl<'a> Solver<'a> {
     }
 
     /// Adds a block between two frames, `ahead` apart in time.
-    fn couple(&self, system: &mut System, part: &Part, (a, b, ahead): (usize, usize, usize), block: &Matrix3<f64>) {
+    fn couple(
+        &self,
+        system: &mut System,
+        part: &Part,
+        (a, b, ahead): (usize, usize, usize),
+        block: &Matrix3<f64>,
+    ) {
         let (n, size) = (self.n, self.n * self.n);
         let blocks = match ahead {
             0 => &mut system.band.diagonal,
@@ -226,7 +258,12 @@ impl<'a> Solver<'a> {
             2 if b == a + 2 => &mut system.band.second,
             _ => {
                 let (row, column) = (a * n + part.dof, b * n + part.dof);
-                system.corners.push(Corner { row, column, block: *block, size: part.size });
+                system.corners.push(Corner {
+                    row,
+                    column,
+                    block: *block,
+                    size: part.size,
+                });
                 return;
             }
         };
@@ -244,7 +281,8 @@ pub(super) fn carried(qpos: &[f64], turn: &Matrix3<f64>, shift: &Vector3<f64>) -
     let at = turn * super::model::vector(qpos, 0) + shift;
     moved[..3].copy_from_slice(at.as_slice());
     let turn = nalgebra::Rotation3::from_matrix_unchecked(*turn);
-    let turned = nalgebra::UnitQuaternion::from_rotation_matrix(&turn) * super::model::quaternion(qpos, 3);
+    let turned =
+        nalgebra::UnitQuaternion::from_rotation_matrix(&turn) * super::model::quaternion(qpos, 3);
     super::model::put_quaternion(&mut moved, 3, &turned);
     moved
 }

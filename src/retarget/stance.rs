@@ -33,14 +33,21 @@ const HANDS: [Slot; 2] = [Slot::LeftHand, Slot::RightHand];
 const HELD: [f64; 2] = [0.015, 0.05];
 
 fn limbs(model: &Model, goals: &Goals) -> Vec<Limb> {
-    let slots = FEET.into_iter().map(|s| (s, true)).chain(HANDS.into_iter().map(|s| (s, false)));
+    let slots = FEET
+        .into_iter()
+        .map(|s| (s, true))
+        .chain(HANDS.into_iter().map(|s| (s, false)));
     slots
         .filter_map(|(slot, is_foot)| {
             let key = goals.keys.iter().position(|key| key.slot == slot)?;
             let body = goals.keys[key].body;
             let carried = |k: &usize| under(model, body, model.knobs[*k].body);
             let knobs = (0..model.knobs.len()).filter(carried).collect();
-            Some(Limb { key, is_foot, knobs })
+            Some(Limb {
+                key,
+                is_foot,
+                knobs,
+            })
         })
         .collect()
 }
@@ -51,7 +58,12 @@ fn under(model: &Model, top: usize, body: usize) -> bool {
 
 /// Bodies that may touch the ground: feet with what hangs on them, and hands if the clip sets them down.
 pub(super) fn contact_bodies(model: &Model, goals: &Goals, anchors: &[Vec<Anchor>]) -> Vec<usize> {
-    let used = |body: usize| anchors.iter().flatten().any(|a| model.knobs[a.knob].body == body);
+    let used = |body: usize| {
+        anchors
+            .iter()
+            .flatten()
+            .any(|a| model.knobs[a.knob].body == body)
+    };
     let mut bodies: Vec<usize> = Vec::new();
     for limb in limbs(model, goals) {
         for knob in limb.knobs {
@@ -71,7 +83,9 @@ const TOUCHES: f64 = 0.5;
 /// `contact[f][c]`: whether contact body `c` stands at frame `f`.
 pub(super) fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) -> Vec<Vec<bool>> {
     let stands = |frame: &Vec<Anchor>, body: usize| {
-        frame.iter().any(|a| a.weight >= TOUCHES && model.knobs[a.knob].body == body)
+        frame
+            .iter()
+            .any(|a| a.weight >= TOUCHES && model.knobs[a.knob].body == body)
     };
     let row = |frame: &Vec<Anchor>| bodies.iter().map(|b| stands(frame, *b)).collect();
     anchors.iter().map(row).collect()
@@ -80,8 +94,10 @@ pub(super) fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) 
 /// `paths[limb][knob][f]`: centre of a limb's knob when the limb's key is at its goal.
 fn paths(model: &Model, goals: &Goals, limbs: &[Limb]) -> Vec<Vec<Vec<Vector3<f64>>>> {
     let mut pose: Pose = model.empty_pose();
-    let mut paths: Vec<Vec<Vec<Vector3<f64>>>> =
-        limbs.iter().map(|limb| vec![Vec::new(); limb.knobs.len()]).collect();
+    let mut paths: Vec<Vec<Vec<Vector3<f64>>>> = limbs
+        .iter()
+        .map(|limb| vec![Vec::new(); limb.knobs.len()])
+        .collect();
     for f in 0..goals.frames() {
         model.evaluate(&goals.guess[f], &mut pose);
         for (limb, paths) in limbs.iter().zip(&mut paths) {
@@ -97,9 +113,12 @@ fn paths(model: &Model, goals: &Goals, limbs: &[Limb]) -> Vec<Vec<Vec<Vector3<f6
     paths
 }
 
-/// Height of the ground below the goals: the median of the lowest foot points while they stand.
-pub(super) fn ground(model: &Model, goals: &Goals, fps: f64, leg: f64, loop_mode: LoopMode) -> f64 {
-    let limbs: Vec<Limb> = limbs(model, goals).into_iter().filter(|l| l.is_foot).collect();
+/// `soles[f][k]`: every foot knob's lowest point.
+pub(super) fn soles(model: &Model, goals: &Goals) -> Vec<Vec<Vector3<f64>>> {
+    let limbs: Vec<Limb> = limbs(model, goals)
+        .into_iter()
+        .filter(|l| l.is_foot)
+        .collect();
     let paths = paths(model, goals, &limbs);
     let mut soles: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); goals.frames()];
     for (limb, paths) in limbs.iter().zip(&paths) {
@@ -110,16 +129,21 @@ pub(super) fn ground(model: &Model, goals: &Goals, fps: f64, leg: f64, loop_mode
             }
         }
     }
-    let lowest = |f: &usize| soles[*f].iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    soles
+}
+
+/// Height of the ground below the goals: the median of the lowest foot points while they stand.
+pub(super) fn ground(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64, loop_mode: LoopMode) -> f64 {
+    let lowest = |f: usize| soles[f].iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let heights = |frames: &mut dyn Iterator<Item = usize>| {
-        let mut heights: Vec<f64> = frames.map(|f| lowest(&f)).filter(|h| h.is_finite()).collect();
+        let mut heights: Vec<f64> = frames.map(lowest).filter(|h| h.is_finite()).collect();
         heights.sort_by(f64::total_cmp);
         heights
     };
-    let all = heights(&mut (0..goals.frames()));
+    let all = heights(&mut (0..soles.len()));
     let low = all.get(all.len() / 20).copied().unwrap_or(0.0);
-    let stands = contact::detect_above(&soles, low, fps, leg, loop_mode);
-    let standing = heights(&mut (0..goals.frames()).filter(|f| stands[*f]));
+    let stands = contact::detect_above(soles, low, fps, leg, loop_mode);
+    let standing = heights(&mut (0..soles.len()).filter(|f| stands[*f]));
     standing.get(standing.len() / 2).copied().unwrap_or(low)
 }
 
@@ -137,7 +161,11 @@ impl Timeline {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), c.heading);
             Isometry3::from_parts(c.translation.into(), turn)
         });
-        Timeline { frames, margin: if step.is_some() { margin } else { 0 }, cycle: step }
+        Timeline {
+            frames,
+            margin: if step.is_some() { margin } else { 0 },
+            cycle: step,
+        }
     }
 
     /// A path over the whole timeline, from its own frames.
@@ -146,9 +174,12 @@ impl Timeline {
             return path.to_vec();
         };
         let cycle = self.frames - 1;
-        let moved = |by: &Isometry3<f64>, p: &Vector3<f64>| (by * nalgebra::Point3::from(*p)).coords;
+        let moved =
+            |by: &Isometry3<f64>, p: &Vector3<f64>| (by * nalgebra::Point3::from(*p)).coords;
         let back = step.inverse();
-        let before = path[cycle - self.margin..cycle].iter().map(|p| moved(&back, p));
+        let before = path[cycle - self.margin..cycle]
+            .iter()
+            .map(|p| moved(&back, p));
         let after = path[1..=self.margin].iter().map(|p| moved(&step, p));
         before.chain(path.iter().copied()).chain(after).collect()
     }
@@ -180,14 +211,23 @@ pub(super) fn plant(
         for (&knob, path) in limb.knobs.iter().zip(&paths) {
             let path = timeline.extend(path);
             for (f, at, weight) in stances(&path, model.knobs[knob].radius, fps, leg) {
-                held[f].push(Held { knob, from: path[f], at, weight });
+                held[f].push(Held {
+                    knob,
+                    from: path[f],
+                    at,
+                    weight,
+                });
             }
         }
         let own: Vec<Vector3<f64>> = goals.points.iter().map(|points| points[limb.key]).collect();
         let moves = footing::moves(&held, &timeline.extend(&own), fps);
         for f in 0..goals.frames() {
             let here = timeline.margin + f;
-            let anchor = |h: &Held| Anchor { knob: h.knob, at: h.at, weight: h.weight };
+            let anchor = |h: &Held| Anchor {
+                knob: h.knob,
+                at: h.at,
+                weight: h.weight,
+            };
             anchors[f].extend(held[here].iter().map(anchor));
             footing::apply(goals, f, limb.key, &moves[here]);
         }
@@ -196,9 +236,16 @@ pub(super) fn plant(
 }
 
 /// Frame, place and weight wherever a knob's path stands on the ground.
-fn stances(path: &[Vector3<f64>], radius: f64, fps: f64, leg: f64) -> Vec<(usize, Vector3<f64>, f64)> {
-    let sole: Vec<Vec<Vector3<f64>>> =
-        path.iter().map(|p| vec![p - Vector3::z() * radius]).collect();
+fn stances(
+    path: &[Vector3<f64>],
+    radius: f64,
+    fps: f64,
+    leg: f64,
+) -> Vec<(usize, Vector3<f64>, f64)> {
+    let sole: Vec<Vec<Vector3<f64>>> = path
+        .iter()
+        .map(|p| vec![p - Vector3::z() * radius])
+        .collect();
     let stands = contact::detect_above(&sole, 0.0, fps, leg, LoopMode::Clamp);
     let weight = |f: usize| {
         let height = sole[f][0].z / leg;
