@@ -82,7 +82,9 @@ impl Clip {
         let at = (time * self.fps).clamp(0.0, last as f64);
         let frame = (at as usize).min(last);
         let t = at - frame as f64;
-        let a = &self.frames[frame];
+        let Some(a) = self.frames.get(frame) else {
+            return Vec::new();
+        };
         // Frames that were sampled come back bit for bit, despite `frame / fps * fps`.
         if t < 1e-9 {
             return a.clone();

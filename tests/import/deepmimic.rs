@@ -237,7 +237,8 @@ fn broken_motions_are_refused_with_a_reason() {
     let read = |text: &str| import::read(text.as_bytes(), "a.txt", None, &Options::default());
     let clip = read(&row(&|_| {})).expect("the row is sound");
     assert_eq!((clip.frames.len(), clip.fps), (2, 10.0));
-    let cases: [(&dyn Fn(&mut Vec<f64>), &str); 5] = [
+    type Change<'a> = &'a dyn Fn(&mut Vec<f64>);
+    let cases: [(Change<'_>, &str); 5] = [
         (&|row| row[0] = 0.0, "frame 0 lasts 0 s"),
         (&|row| row[0] = -1.0, "frame 0 lasts -1 s"),
         (&|row| row[12] = 0.0, "`neck`: the rotation is zero"),

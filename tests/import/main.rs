@@ -2,6 +2,8 @@
 
 mod deepmimic;
 mod gltf;
+mod gltf_made;
+mod gltf_reference;
 mod robust;
 
 use std::path::{Path, PathBuf};

@@ -49,7 +49,7 @@ impl Damage {
 
 /// Damages `bytes` many times; reading may fail but must return, and what is returned must be whole.
 fn survives(name: &str, bytes: &[u8], rounds: usize) {
-    let mut damage = Damage(0x6d69_6d69_63);
+    let mut damage = Damage(0x006d_696d_6963);
     let mut refused = 0;
     for _ in 0..rounds {
         let mut damaged = bytes.to_vec();
@@ -76,7 +76,11 @@ fn survives(name: &str, bytes: &[u8], rounds: usize) {
 
 #[test]
 fn damaged_synthetic_files() {
-    survives("a.gltf", super::gltf::synthetic_file().as_bytes(), 4000);
+    survives(
+        "a.gltf",
+        super::gltf_made::synthetic_file().as_bytes(),
+        4000,
+    );
 }
 
 #[test]
@@ -101,7 +105,7 @@ fn damaged_real_files() {
 
 #[test]
 fn no_bytes_and_all_cuts_of_a_small_file() {
-    let text = super::gltf::synthetic_file();
+    let text = super::gltf_made::synthetic_file();
     for end in 0..text.len() {
         let cut = import::read(&text.as_bytes()[..end], "a.gltf", None, &Options::default());
         assert!(cut.is_err(), "cut at {end}");

@@ -47,29 +47,35 @@ fn skin_pose(
     accessors: &mut Accessors<'_>,
 ) -> Option<Vec<(usize, Matrix4<f64>)>> {
     let numbers = accessors.read(skin.inverse_bind_matrices?, "MAT4").ok()?;
-    let mut inverse_bind: Vec<Option<Matrix4<f64>>> = vec![None; tree.nodes.len()];
+    let mut bind: Vec<Option<Matrix4<f64>>> = vec![None; tree.nodes.len()];
     for (joint, numbers) in skin.joints.iter().zip(numbers.chunks_exact(16)) {
-        let slot = inverse_bind.get_mut(*tree.place.get(*joint)?)?;
-        *slot = Some(Matrix4::from_column_slice(numbers));
+        let slot = bind.get_mut(*tree.place.get(*joint)?)?;
+        *slot = Matrix4::from_column_slice(numbers).try_inverse();
     }
     let world = tree.rest_world();
-    let local = |node: usize| {
-        let bind = inverse_bind[node]?.try_inverse()?;
-        let parent = tree.nodes[node].parent;
-        let local = match parent.and_then(|parent| inverse_bind[parent]) {
-            Some(inverse_parent) => inverse_parent * bind,
-            None => topmost(
-                &bind,
-                &tree.rest[node].matrix(),
-                parent.map(|parent| world[parent]),
-            )?,
+    let mut locals = Vec::new();
+    for (node, about) in tree.nodes.iter().enumerate() {
+        let rest = tree.rest[node].matrix();
+        let above = about.parent.and_then(|parent| bind[parent]);
+        let Some(placed) = bind[node] else {
+            // Between joints of the skin, other nodes stand as they do.
+            bind[node] = above.map(|above| above * rest);
+            continue;
         };
-        local.iter().all(|x| x.is_finite()).then_some((node, local))
-    };
-    Some((0..tree.nodes.len()).filter_map(local).collect())
+        let local = match above {
+            Some(above) => above.try_inverse().map(|above| above * placed),
+            None => topmost(&placed, &rest, about.parent.map(|parent| world[parent])),
+        };
+        locals.extend(local.filter(finite).map(|local| (node, local)));
+    }
+    Some(locals)
 }
 
-/// Bind transform of a joint whose parent isn't in the skin. Bind matrices are in the mesh's space, which files put
+fn finite(matrix: &Matrix4<f64>) -> bool {
+    matrix.iter().all(|x| x.is_finite())
+}
+
+/// Bind transform of a joint with no other of the skin above it. Bind matrices are in the mesh's space, which files put
 /// at the parent or at the scene's origin: whichever agrees better with the node, if one does.
 fn topmost(
     bind: &Matrix4<f64>,
