@@ -197,6 +197,13 @@ fn sparse_and_normalised_accessors_mean_what_they_say() {
             .to_string()
             .contains("out of range")
     );
+    let many = text.replace(r#""sparse":{"count":2"#, r#""sparse":{"count":3"#);
+    assert!(
+        read(&many)
+            .expect_err("too many")
+            .to_string()
+            .contains("3 sparse values")
+    );
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::GltfError;
 use super::buffer::Buffers;
-use super::document::{Accessor, Document, SparsePart};
+use super::document::{Accessor, Document, Sparse};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -104,30 +104,54 @@ impl<'a> Accessors<'a> {
             None => vec![0.0; length],
         };
         if let Some(sparse) = &about.sparse {
-            let part = |part: &SparsePart, width, component, normalized| Layout {
-                view: part.buffer_view,
-                offset: part.byte_offset,
+            if sparse.count > about.count {
+                return Err(format!(
+                    "{} sparse values for {} elements",
+                    sparse.count, about.count
+                ));
+            }
+            let values = Layout {
+                view: sparse.values.buffer_view,
+                offset: sparse.values.byte_offset,
                 count: sparse.count,
                 width,
                 component,
-                normalized,
+                normalized: about.normalized,
             };
-            let kind = sparse
-                .indices
-                .component_type
-                .ok_or("sparse indices without a type")?;
-            let indices = self.elements(&part(&sparse.indices, 1, Component::new(kind)?, false))?;
-            let values =
-                self.elements(&part(&sparse.values, width, component, about.normalized))?;
-            for (index, value) in indices.iter().zip(values.chunks_exact(width)) {
-                let at = (*index as usize)
-                    .checked_mul(width)
-                    .and_then(|at| numbers.get_mut(at..at + width));
-                at.ok_or(format!("sparse index {index} is out of range"))?
-                    .copy_from_slice(value);
-            }
+            self.substitute(sparse, &values, &mut numbers)?;
         }
         Ok(numbers)
+    }
+
+    /// Puts the values of a sparse accessor, laid out as `values` says, over `numbers`.
+    fn substitute(
+        &mut self,
+        sparse: &Sparse,
+        values: &Layout,
+        numbers: &mut [f64],
+    ) -> Result<(), String> {
+        let kind = sparse
+            .indices
+            .component_type
+            .ok_or("sparse indices without a type")?;
+        let indices = self.elements(&Layout {
+            view: sparse.indices.buffer_view,
+            offset: sparse.indices.byte_offset,
+            count: sparse.count,
+            width: 1,
+            component: Component::new(kind)?,
+            normalized: false,
+        })?;
+        let width = values.width;
+        let values = self.elements(values)?;
+        for (index, value) in indices.iter().zip(values.chunks_exact(width)) {
+            let at = (*index as usize).checked_mul(width);
+            let place = at.and_then(|at| numbers.get_mut(at..at.checked_add(width)?));
+            place
+                .ok_or(format!("sparse index {index} is out of range"))?
+                .copy_from_slice(value);
+        }
+        Ok(())
     }
 
     /// The elements that `layout` describes, provided that all of them lie in the view and the view in its buffer.
@@ -153,6 +177,9 @@ impl<'a> Accessors<'a> {
             .byte_stride
             .filter(|&stride| stride > 0)
             .unwrap_or(size);
+        if stride < size {
+            return Err(format!("elements of {size} bytes stand {stride} apart"));
+        }
         let last = layout.count.saturating_sub(1).checked_mul(stride);
         let end = last.and_then(|last| last.checked_add(size)?.checked_add(layout.offset));
         if layout.count > 0 && end.is_none_or(|end| end > bytes.len()) {
