@@ -13,6 +13,9 @@ const APART: f64 = 0.4;
 
 type Candidate = (usize, f64);
 
+/// Joint, confidence, and whether it stands apart from the limb.
+type Link = (usize, f64, bool);
+
 struct Limb {
     side: Side,
     /// Parts of root, bend and end; slots for them.
@@ -111,9 +114,9 @@ impl Limb {
     }
 
     /// Best root, bend and end: joint, confidence, whether it stands apart.
-    fn chain(&self, tree: &Tree, labels: &[Label]) -> Option<[Option<(usize, f64, bool)>; 3]> {
+    fn chain(&self, tree: &Tree, labels: &[Label]) -> Option<[Option<Link>; 3]> {
         let [roots, bends, ends] = self.parts.map(|part| candidates(labels, part, self.side));
-        let mut best: Option<(f64, [Option<(usize, f64, bool)>; 3])> = None;
+        let mut best: Option<(f64, [Option<Link>; 3])> = None;
         for root in &roots {
             for bend in bends.iter().filter(|b| tree.is_above(root.0, b.0)) {
                 let end = end_of(tree, &ends, root.0, bend.0, self.beyond.is_some());
@@ -135,7 +138,7 @@ fn end_of(
     root: usize,
     bend: usize,
     may_stand_apart: bool,
-) -> Option<(usize, f64, bool)> {
+) -> Option<Link> {
     let below = ends.iter().find(|e| tree.is_above(bend, e.0));
     let apart = ends.iter().find(|e| {
         may_stand_apart && e.1 > APART && e.0 != root && e.0 != bend && !tree.is_above(root, e.0)

@@ -3,7 +3,7 @@
 use super::goals::Goals;
 use super::limits;
 use super::model::{Model, Pose, quaternion};
-use super::rotation::{log, right_jacobian_inverse};
+use super::rotation::{left_jacobian_inverse, log, right_jacobian_inverse};
 use super::stance::Anchor;
 use crate::skeleton::JointKind;
 use nalgebra::{Matrix3, Vector3};
@@ -269,10 +269,9 @@ pub(super) fn bend(part: &Part, into: &[f64], out: &[f64]) -> Bend {
         |v: &[f64]| Vector3::from_fn(|i, _| if i < part.size { v[part.dof + i] } else { 0.0 });
     let (into, out) = (pick(into), pick(out));
     let by = if part.turns {
-        let left = |v: &Vector3<f64>| right_jacobian_inverse(&-v);
         [
-            left(&into),
-            -left(&out) - right_jacobian_inverse(&into),
+            left_jacobian_inverse(&into),
+            -left_jacobian_inverse(&out) - right_jacobian_inverse(&into),
             right_jacobian_inverse(&out),
         ]
     } else {

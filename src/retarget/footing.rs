@@ -111,10 +111,16 @@ fn nearest<'a>(fitted: impl Iterator<Item = &'a Option<Move>>) -> Vec<Option<(us
 fn smooth(moves: &[Move], half: usize) -> Vec<Move> {
     let mean = |f: usize| {
         let (mut sum, mut total) = (NONE, 0.0);
-        for g in f.saturating_sub(half)..=(f + half).min(moves.len() - 1) {
+        let from = f.saturating_sub(half);
+        for (g, by) in moves
+            .iter()
+            .enumerate()
+            .skip(from)
+            .take(f + half + 1 - from)
+        {
             let weight = (half + 1 - f.abs_diff(g)) as f64;
-            sum.shift += moves[g].shift * weight;
-            sum.turn += moves[g].turn * weight;
+            sum.shift += by.shift * weight;
+            sum.turn += by.turn * weight;
             total += weight;
         }
         Move {

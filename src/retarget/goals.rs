@@ -1,6 +1,7 @@
 //! What every frame of the skeleton should look like: goals for points and turns, from the source's frames.
 
 use super::align::Alignment;
+use super::limits;
 use super::model::Model;
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
@@ -226,17 +227,12 @@ impl<'a> Builder<'a> {
             qpos = self
                 .skeleton
                 .rotations_to_qpos(&root, &turns, before.map(Vec::as_slice));
+            limits::clamp_hinges(self.skeleton, &mut qpos);
             reached = self.skeleton.forward(&qpos);
-            for b in 1..bodies.len() {
-                let hinged = bodies[b].joints.len() == 1 || bodies[b].joints.is_empty();
-                if hinged {
-                    world[b] = reached[b].rotation;
-                }
-            }
-            for b in 1..bodies.len() {
-                if let Some(goal) = self.goal(b, rotations).filter(|_| self.turns_freely(b)) {
-                    world[b] = goal;
-                }
+            for (b, rotation) in world.iter_mut().enumerate().skip(1) {
+                let goal = self.goal(b, rotations);
+                let free = goal.filter(|_| self.turns_freely(b));
+                *rotation = free.unwrap_or(reached[b].rotation);
             }
         }
         (qpos, reached)

@@ -70,18 +70,21 @@ pub(super) fn violations(skeleton: &Skeleton, qpos: &[f64]) -> usize {
 
 /// Moves every coordinate that is outside to the border of its range.
 pub(super) fn clamp(skeleton: &Skeleton, qpos: &mut [f64]) {
+    clamp_hinges(skeleton, qpos);
+    let joints = skeleton.bodies.iter().flat_map(|body| &body.joints);
+    for joint in joints.filter(|joint| joint.kind == JointKind::Ball) {
+        let (v, beyond) = ball(joint, qpos);
+        if beyond != Vector3::zeros() {
+            put_quaternion(qpos, joint.qpos, &exp(&(v - beyond)));
+        }
+    }
+}
+
+/// The same for hinges and slides only.
+pub(super) fn clamp_hinges(skeleton: &Skeleton, qpos: &mut [f64]) {
     for joint in skeleton.bodies.iter().flat_map(|body| &body.joints) {
-        match joint.kind {
-            JointKind::Free => {}
-            JointKind::Ball => {
-                let (v, beyond) = ball(joint, qpos);
-                if beyond != Vector3::zeros() {
-                    put_quaternion(qpos, joint.qpos, &exp(&(v - beyond)));
-                }
-            }
-            JointKind::Hinge(_) | JointKind::Slide(_) => {
-                qpos[joint.qpos] -= slack(joint, qpos);
-            }
+        if let JointKind::Hinge(_) | JointKind::Slide(_) = joint.kind {
+            qpos[joint.qpos] -= slack(joint, qpos);
         }
     }
 }

@@ -74,25 +74,6 @@ impl<'a> Model<'a> {
         self.skeleton.bodies.iter().flat_map(|body| &body.joints)
     }
 
-    /// Coordinates of the pose that the MJCF shows.
-    pub fn rest(&self) -> Vec<f64> {
-        let mut qpos = vec![0.0; self.skeleton.nq];
-        for body in &self.skeleton.bodies {
-            for joint in &body.joints {
-                match joint.kind {
-                    JointKind::Free => {
-                        let at = body.rest.translation.vector;
-                        qpos[joint.qpos..joint.qpos + 3].copy_from_slice(at.as_slice());
-                        put_quaternion(&mut qpos, joint.qpos + 3, &body.rest.rotation);
-                    }
-                    JointKind::Ball => qpos[joint.qpos] = 1.0,
-                    JointKind::Hinge(_) | JointKind::Slide(_) => {}
-                }
-            }
-        }
-        qpos
-    }
-
     pub fn empty_pose(&self) -> Pose {
         Pose {
             bodies: vec![Isometry3::identity(); self.skeleton.bodies.len()],

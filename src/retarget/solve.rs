@@ -56,12 +56,7 @@ impl<'a> Solver<'a> {
     /// Improves `frames` until nothing is gained any more; returns the number of steps taken.
     pub fn run(&self, frames: &mut Vec<Vec<f64>>) -> usize {
         let count = frames.len();
-        let empty = || System {
-            band: Pentadiagonal::new(self.n, count),
-            gradient: vec![0.0; self.n * count],
-            corners: Vec::new(),
-        };
-        let mut system = empty();
+        let mut system = self.empty(count);
         let mut cost = self.assemble(frames, &mut system);
         let mut damping = DAMPING;
         for step in 0..ITERATIONS {
@@ -166,6 +161,22 @@ impl<'a> Solver<'a> {
             cost += self.problem.frame(f, qpos, &mut pose, &mut normal);
         }
         cost + self.smoothness(frames, system)
+    }
+
+    /// For tests against differences.
+    #[cfg(test)]
+    pub fn cost_and_gradient(&self, frames: &[Vec<f64>]) -> (f64, Vec<f64>) {
+        let mut system = self.empty(frames.len());
+        let cost = self.assemble(frames, &mut system);
+        (cost, system.gradient)
+    }
+
+    fn empty(&self, count: usize) -> System {
+        System {
+            band: Pentadiagonal::new(self.n, count),
+            gradient: vec![0.0; self.n * count],
+            corners: Vec::new(),
+        }
     }
 
     /// Tangent vectors from every frame to the next; a cycle's last leads to the first, carried on.

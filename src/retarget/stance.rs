@@ -221,15 +221,15 @@ pub(super) fn plant(
         }
         let own: Vec<Vector3<f64>> = goals.points.iter().map(|points| points[limb.key]).collect();
         let moves = footing::moves(&held, &timeline.extend(&own), fps);
-        for f in 0..goals.frames() {
-            let here = timeline.margin + f;
+        let own = held.iter().zip(&moves).skip(timeline.margin);
+        for (f, (frame, (held, by))) in anchors.iter_mut().zip(own).enumerate() {
             let anchor = |h: &Held| Anchor {
                 knob: h.knob,
                 at: h.at,
                 weight: h.weight,
             };
-            anchors[f].extend(held[here].iter().map(anchor));
-            footing::apply(goals, f, limb.key, &moves[here]);
+            frame.extend(held.iter().map(anchor));
+            footing::apply(goals, f, limb.key, by);
         }
     }
     anchors

@@ -1,116 +1,458 @@
+use super::goals::{Key, Turn};
+use super::model::put_quaternion;
+use super::stance::Anchor;
 use super::*;
+use crate::clip::{Joint, Source};
+use crate::humanoid::Slot;
 use crate::import;
+use nalgebra::{Isometry3, UnitQuaternion};
+
+fn data(file: &str) -> Option<String> {
+    let path = format!("{}/../shared/data/{file}", env!("CARGO_MANIFEST_DIR"));
+    let there = std::path::Path::new(&path).exists();
+    if !there {
+        eprintln!("skipped: no test data `{file}`");
+    }
+    there.then_some(path)
+}
 
 fn clip(file: &str, take: Option<&str>) -> Option<Clip> {
-    let path = format!("{}/../shared/data/{file}", env!("CARGO_MANIFEST_DIR"));
-    if !std::path::Path::new(&path).exists() {
-        eprintln!("skipped: no test data `{file}`");
-        return None;
-    }
     let options = import::Options {
         take: take.map(str::to_owned),
         ..Default::default()
     };
-    Some(import::load(&path, &options).unwrap_or_else(|e| panic!("{file}: {e}")))
+    Some(import::load(data(file)?, &options).unwrap_or_else(|e| panic!("{file}: {e}")))
+}
+
+fn humanoid() -> Skeleton {
+    Skeleton::load("humanoid").unwrap()
+}
+
+fn on_humanoid(clip: &Clip) -> Retargeted {
+    retarget(clip, &humanoid(), &Options::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Numbers between −1 and 1.
+fn random() -> impl FnMut() -> f64 {
+    let mut seed = 11_u64;
+    move || {
+        seed = seed
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (seed >> 33) as f64 / (1_u64 << 30) as f64 - 1.0
+    }
+}
+
+/// Mixamo's names for the humanoid's slots.
+fn mixamo(slot: Slot) -> &'static str {
+    match slot {
+        Slot::Hips => "Hips",
+        Slot::Chest => "Spine",
+        Slot::Head => "Head",
+        Slot::LeftUpperArm => "LeftArm",
+        Slot::LeftLowerArm => "LeftForeArm",
+        Slot::LeftHand => "LeftHand",
+        Slot::RightUpperArm => "RightArm",
+        Slot::RightLowerArm => "RightForeArm",
+        Slot::RightHand => "RightHand",
+        Slot::LeftUpperLeg => "LeftUpLeg",
+        Slot::LeftLowerLeg => "LeftLeg",
+        Slot::LeftFoot => "LeftFoot",
+        Slot::RightUpperLeg => "RightUpLeg",
+        Slot::RightLowerLeg => "RightLeg",
+        Slot::RightFoot => "RightFoot",
+        other => panic!("the humanoid has no {other}"),
+    }
+}
+
+/// The coordinates of a joint that turns the body in `slot`.
+fn coordinate(skeleton: &Skeleton, slot: Slot) -> usize {
+    skeleton.bodies[skeleton.slots[&slot]].joints[0].qpos
+}
+
+fn turned(skeleton: &Skeleton, qpos: &mut [f64], slot: Slot, by: [f64; 3]) {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::from(by));
+    put_quaternion(qpos, coordinate(skeleton, slot), &turn);
+}
+
+/// A clip of a rig that has the skeleton's bones `size` times as large, `down` lower, with local axes of its own, and
+/// shows the poses `frames`; its rest pose is `rest`.
+fn rig(skeleton: &Skeleton, rest: &[f64], frames: &[Vec<f64>], size: f64, down: f64) -> Clip {
+    let mut random = random();
+    let axes: Vec<UnitQuaternion<f64>> = (skeleton.bodies.iter())
+        .map(|_| UnitQuaternion::from_scaled_axis(Vector3::new(random(), random(), random()) * 2.0))
+        .collect();
+    let world = |qpos: &[f64]| -> Vec<Isometry3<f64>> {
+        let bodies = skeleton.forward(qpos);
+        let own = bodies.iter().zip(&axes).map(|(body, axes)| {
+            let at = body.translation.vector * size - Vector3::z() * down;
+            Isometry3::from_parts(at.into(), body.rotation * axes)
+        });
+        own.collect()
+    };
+    let local = |world: &[Isometry3<f64>]| -> Vec<Isometry3<f64>> {
+        let up = |b: usize| {
+            skeleton.bodies[b]
+                .parent
+                .map_or_else(Isometry3::identity, |p| world[p])
+        };
+        (0..world.len())
+            .map(|b| up(b).inverse() * world[b])
+            .collect()
+    };
+    let name = |b: usize| {
+        skeleton
+            .slots
+            .iter()
+            .find(|(_, body)| **body == b)
+            .map(|(slot, _)| mixamo(*slot))
+    };
+    let joints = local(&world(rest))
+        .into_iter()
+        .enumerate()
+        .map(|(b, rest)| Joint {
+            name: name(b).unwrap_or("Other").to_owned(),
+            parent: skeleton.bodies[b].parent,
+            rest,
+        });
+    Clip {
+        name: "rig".to_owned(),
+        fps: 30.0,
+        loop_mode: LoopMode::Clamp,
+        joints: joints.collect(),
+        frames: frames.iter().map(|qpos| local(&world(qpos))).collect(),
+        source: Source {
+            file: "rig".to_owned(),
+            sha256: String::new(),
+            format: "gltf".to_owned(),
+            take: String::new(),
+            fps: 30.0,
+            up_axis: "+Z".to_owned(),
+            unit_m: 1.0,
+        },
+        problems: Vec::new(),
+    }
+}
+
+/// Arms out, arms half down, arms hanging.
+const ARM_ANGLES: [f64; 3] = [1.5707, 0.8, 0.0];
+
+#[test]
+fn poses_come_back_from_a_rig_of_another_size_axes_and_rest_pose() {
+    let skeleton = humanoid();
+    let standing = skeleton.rest_qpos();
+    let frames: Vec<Vec<f64>> = (0..40)
+        .map(|f| {
+            let t = f64::from(f) * 0.15;
+            let mut qpos = standing.clone();
+            turned(
+                &skeleton,
+                &mut qpos,
+                Slot::Chest,
+                [0.1 * t.sin(), 0.2, 0.4 * t.cos()],
+            );
+            turned(&skeleton, &mut qpos, Slot::Head, [0.0, 0.3 * t.sin(), 0.3]);
+            turned(
+                &skeleton,
+                &mut qpos,
+                Slot::LeftUpperArm,
+                [0.6, -0.8 - 0.5 * t.sin(), 0.2],
+            );
+            turned(
+                &skeleton,
+                &mut qpos,
+                Slot::RightUpperArm,
+                [-0.4, -0.3 + 0.6 * t.cos(), -0.3],
+            );
+            qpos[coordinate(&skeleton, Slot::LeftLowerArm)] = -0.9 - 0.4 * t.cos();
+            qpos[coordinate(&skeleton, Slot::RightLowerArm)] = -0.6 - 0.4 * t.sin();
+            qpos
+        })
+        .collect();
+    for angle in ARM_ANGLES {
+        let mut rest = standing.clone();
+        turned(&skeleton, &mut rest, Slot::LeftUpperArm, [angle, 0.0, 0.0]);
+        turned(
+            &skeleton,
+            &mut rest,
+            Slot::RightUpperArm,
+            [-angle, 0.0, 0.0],
+        );
+        let done = on_humanoid(&rig(&skeleton, &rest, &frames, 1.7, 0.3));
+        for (f, qpos) in frames.iter().enumerate() {
+            let expected = skeleton.forward(qpos);
+            for (b, body) in expected.iter().enumerate() {
+                let found = &done.motion.bodies[f][b];
+                let away = (found.translation.vector - body.translation.vector).norm();
+                assert!(
+                    away < 0.005,
+                    "arms {angle}, frame {f}, {}: {away} m",
+                    skeleton.bodies[b].name
+                );
+                let turned = found.rotation.angle_to(&body.rotation);
+                assert!(
+                    turned < 0.05,
+                    "arms {angle}, frame {f}, {}: {turned} rad",
+                    skeleton.bodies[b].name
+                );
+            }
+        }
+        assert!(
+            done.motion
+                .tracks
+                .contact
+                .iter()
+                .flatten()
+                .all(|stands| *stands)
+        );
+        assert!(done.report.foot_skate_m_s < 1e-3);
+    }
+}
+
+/// Goals, anchors and coordinates at which every kind of residual is at work.
+fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec<f64>>) {
+    let mut random = random();
+    let model = Model::new(skeleton);
+    let mut wild = |size: f64| {
+        let mut qpos = skeleton.rest_qpos();
+        qpos[2] -= 0.1;
+        let step: Vec<f64> = (0..skeleton.nv).map(|_| size * random()).collect();
+        model.step(&mut qpos, &step);
+        qpos
+    };
+    let frames: Vec<Vec<f64>> = (0..count).map(|_| wild(0.8)).collect();
+    let guess: Vec<Vec<f64>> = (0..count).map(|_| wild(0.3)).collect();
+    let bodies: Vec<usize> = skeleton.slots.values().copied().collect();
+    let goals = Goals {
+        keys: bodies
+            .iter()
+            .map(|b| Key {
+                slot: Slot::Hips,
+                body: *b,
+                weight: 0.7,
+            })
+            .collect(),
+        turns: bodies
+            .iter()
+            .map(|b| Turn {
+                body: *b,
+                weight: 0.2,
+            })
+            .collect(),
+        points: guess
+            .iter()
+            .map(|q| {
+                skeleton
+                    .forward(q)
+                    .iter()
+                    .map(|b| b.translation.vector)
+                    .collect()
+            })
+            .collect(),
+        rotations: guess
+            .iter()
+            .map(|q| skeleton.forward(q).iter().map(|b| b.rotation).collect())
+            .collect(),
+        guess,
+    };
+    let anchor = |knob| Anchor {
+        knob,
+        at: Vector3::new(0.1, 0.2, 0.0),
+        weight: 0.6,
+    };
+    (
+        goals,
+        vec![vec![anchor(3), anchor(model.knobs.len() - 1)]; count],
+        frames,
+    )
 }
 
 #[test]
-fn explore() {
-    let skeleton = Skeleton::load("humanoid").unwrap();
-    let names = std::env::var("CLIPS").unwrap_or("deepmimic/humanoid3d_walk.txt".into());
-    for name in names.split(',') {
-        let (file, take) = name
-            .split_once('@')
-            .map_or((name, None), |(f, t)| (f, Some(t)));
-        let Some(clip) = (if file.ends_with(".clip") {
-            Some(Clip::load(file).unwrap())
-        } else {
-            clip(file, take)
-        }) else {
-            return;
+fn the_gradient_is_the_derivative_of_the_cost() {
+    let mut skeletons = vec![humanoid()];
+    skeletons.extend(
+        data("characters/mimickit_humanoid.xml").map(|path| Skeleton::load(&path).unwrap()),
+    );
+    let turning = Cycle {
+        translation: Vector3::new(0.4, -0.2, 0.0),
+        heading: 0.5,
+    };
+    for skeleton in &skeletons {
+        let (goals, anchors, frames) = rough(skeleton, 6);
+        let model = Model::new(skeleton);
+        let problem = Problem {
+            model: &model,
+            goals: &goals,
+            anchors: &anchors,
+            fps: 30.0,
         };
-        let done = match retarget(&clip, &skeleton, &Options::default()) {
-            Ok(done) => done,
-            Err(e) => {
-                println!(
-                    "{name}: {e} {:?}",
-                    clip.joints.iter().map(|j| &j.name).collect::<Vec<_>>()
-                );
-                continue;
-            }
-        };
-        let r = &done.report;
-        println!(
-            "{name:45} {:4}f {:3.0}Hz {:?} it {} {:5.0}f/s kp {:.4} {:.4} skate {:.4} pen {:.4} {:.4} flt {:.4} lim {} cyc {:.3} {:.3} {:.3}",
-            r.frames,
-            clip.fps,
-            clip.loop_mode,
-            done.iterations,
-            r.frames as f64 / done.seconds,
-            r.keypoint_error_m.mean,
-            r.keypoint_error_m.max,
-            r.foot_skate_m_s,
-            r.penetration_m.mean,
-            r.penetration_m.max,
-            r.float_m,
-            r.joint_limit_violations,
-            /*p*/ done.motion.cycle.translation.x,
-            done.motion.cycle.translation.y,
-            done.motion.cycle.heading,
-        );
-        for p in &r.problems {
-            println!("      {}: {}", p.id, p.message);
-        }
-        if std::env::var("SKATE").is_ok() {
-            let m = Model::new(&skeleton);
-            for f in 0..r.frames - 1 {
-                print!("  {f:3} ");
-                for (c, &b) in done.motion.contact_bodies.iter().enumerate() {
-                    let place = |f: usize, k: &model::Knob| {
-                        done.motion.bodies[f][b] * nalgebra::Point3::from(k.center)
+        for cycle in [None, Some(&turning)] {
+            let solver = Solver::new(&problem, cycle);
+            let (_, gradient) = solver.cost_and_gradient(&frames);
+            for f in [0, 1, 3, 5] {
+                for dof in 0..skeleton.nv {
+                    let cost = |step: f64| {
+                        let mut moved = frames.clone();
+                        let mut tangent = vec![0.0; skeleton.nv];
+                        tangent[dof] = step;
+                        model.step(&mut moved[f], &tangent);
+                        solver.cost_and_gradient(&moved).0
                     };
-                    let mut ks: Vec<_> = m.knobs.iter().filter(|k| k.body == b).collect();
-                    ks.sort_by(|x, y| {
-                        (place(f, x).z - x.radius).total_cmp(&(place(f, y).z - y.radius))
-                    });
-                    let v = (place(f + 1, ks[0]) - place(f, ks[0])).xy().norm() * clip.fps;
-                    print!(
-                        " | {} c{} z{:.3} v{:.3}",
-                        skeleton.bodies[b].name,
-                        u8::from(done.motion.tracks.contact[f][c]),
-                        place(f, ks[0]).z - ks[0].radius,
-                        v
+                    let slope = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+                    let found = gradient[f * skeleton.nv + dof];
+                    let error = (slope - found).abs() / (1.0 + slope.abs());
+                    assert!(
+                        error < 1e-4,
+                        "{} frame {f} dof {dof}: {slope} {found}",
+                        skeleton.name
                     );
                 }
-                println!();
-            }
-        }
-        if std::env::var("DUMP").is_ok() {
-            let b = |s: humanoid::Slot| skeleton.slots[&s];
-            use humanoid::Slot::*;
-            for f in (0..r.frames).step_by((r.frames / 16).max(1)) {
-                let at = |s| {
-                    let v = done.motion.bodies[f][b(s)].translation.vector;
-                    format!("{:5.2} {:5.2} {:5.2}", v.x, v.y, v.z)
-                };
-                let knee = |s| {
-                    let j = &skeleton.bodies[b(s)].joints[0];
-                    done.motion.qpos[f][j.qpos]
-                };
-                println!(
-                    "  {f:3} hips {} lf {} rf {} lh {} rh {} knees {:.2} {:.2} elbows {:.2} {:.2} c {:?}",
-                    at(Hips),
-                    at(LeftFoot),
-                    at(RightFoot),
-                    at(LeftHand),
-                    at(RightHand),
-                    knee(LeftLowerLeg),
-                    knee(RightLowerLeg),
-                    knee(LeftLowerArm),
-                    knee(RightLowerArm),
-                    done.motion.tracks.contact[f]
-                );
             }
         }
     }
+}
+
+#[test]
+fn loops_close_exactly_and_equal_inputs_give_equal_bits() {
+    for file in ["walk", "backflip", "spinkick"] {
+        let Some(clip) = clip(&format!("deepmimic/humanoid3d_{file}.txt"), None) else {
+            return;
+        };
+        let (once, again) = (on_humanoid(&clip), on_humanoid(&clip));
+        assert_eq!(once.motion, again.motion);
+        let motion = once.motion;
+        let turn = rotation::exp(&(Vector3::z() * motion.cycle.heading)).to_rotation_matrix();
+        let carried = solve::carried(&motion.qpos[0], turn.matrix(), &motion.cycle.translation);
+        assert_eq!(motion.qpos.last(), Some(&carried), "{file}");
+        assert_eq!(motion.qpos.len(), clip.frames.len());
+    }
+}
+
+#[test]
+fn a_later_start_changes_later_frames_little() {
+    let Some(whole) = clip("deepmimic/humanoid3d_kick.txt", None) else {
+        return;
+    };
+    let mut cut = whole.clone();
+    cut.frames.drain(..10);
+    let (whole, cut) = (on_humanoid(&whole).motion, on_humanoid(&cut).motion);
+    let shift = whole.bodies[10][0].translation.vector - cut.bodies[0][0].translation.vector;
+    let shift = Vector3::new(shift.x, shift.y, 0.0);
+    for f in 8..cut.bodies.len() {
+        for (a, b) in whole.bodies[f + 10].iter().zip(&cut.bodies[f]) {
+            let apart = (a.translation.vector - b.translation.vector - shift).norm();
+            assert!(apart < 0.015, "frame {f}: {apart}");
+        }
+    }
+}
+
+/// Whether a motion has human knees and elbows, its left on the left, and walks forward on alternating feet.
+fn assert_walks(motion: &Motion, skeleton: &Skeleton) {
+    let body = |slot: Slot| skeleton.slots[&slot];
+    let bend = |slot: Slot| coordinate(skeleton, slot);
+    for qpos in &motion.qpos {
+        for (slot, sign) in [
+            (Slot::LeftLowerLeg, 1.0),
+            (Slot::RightLowerLeg, 1.0),
+            (Slot::LeftLowerArm, -1.0),
+            (Slot::RightLowerArm, -1.0),
+        ] {
+            assert!(
+                qpos[bend(slot)] * sign >= -1e-9,
+                "{slot} bends the wrong way"
+            );
+        }
+    }
+    let gap = |f: usize, axis: usize| {
+        let at = |slot| motion.bodies[f][body(slot)].translation.vector[axis];
+        at(Slot::LeftFoot) - at(Slot::RightFoot)
+    };
+    let frames = motion.bodies.len();
+    assert!(
+        (0..frames).map(|f| gap(f, 1)).sum::<f64>() > 0.05 * frames as f64,
+        "left is on the left"
+    );
+    assert!(
+        (0..frames).any(|f| gap(f, 0) > 0.3) && (0..frames).any(|f| gap(f, 0) < -0.3),
+        "feet alternate"
+    );
+    assert!(motion.cycle.translation.x > 1.0 && motion.cycle.translation.y.abs() < 0.1);
+}
+
+fn assert_good(report: &Report, keypoints: f64) {
+    assert!(
+        report.keypoint_error_m.mean < keypoints,
+        "{:?}",
+        report.keypoint_error_m
+    );
+    assert!(report.foot_skate_m_s < 0.02, "{}", report.foot_skate_m_s);
+    assert!(
+        report.penetration_m.max < 0.01,
+        "{:?}",
+        report.penetration_m
+    );
+    assert!(report.float_m < 0.005, "{}", report.float_m);
+    assert_eq!(report.joint_limit_violations, 0);
+}
+
+#[test]
+fn walks_of_several_rigs_walk() {
+    let walk = clip("deepmimic/humanoid3d_walk.txt", None).map(|c| (c, 0.01));
+    let xbot = clip("mixamo/Xbot.glb", Some("walk")).map(|c| (c, 0.03));
+    let soldier = clip("mixamo/Soldier.glb", Some("Walk")).map(|c| (c, 0.03));
+    let skeleton = humanoid();
+    for (clip, keypoints) in [walk, xbot, soldier].into_iter().flatten() {
+        let done = on_humanoid(&clip);
+        assert_good(&done.report, keypoints);
+        assert_walks(&done.motion, &skeleton);
+    }
+}
+
+#[test]
+fn acrobatics_of_the_same_proportions_stay_near_their_source() {
+    for file in ["kick", "backflip", "getup_facedown"] {
+        let Some(clip) = clip(&format!("deepmimic/humanoid3d_{file}.txt"), None) else {
+            return;
+        };
+        assert_good(&on_humanoid(&clip).report, 0.015);
+    }
+}
+
+#[test]
+fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
+    let Some(path) = data("characters/mimickit_humanoid.xml") else {
+        return;
+    };
+    let skeleton = Skeleton::load(&path).unwrap();
+    let Some(clip) = clip("deepmimic/humanoid3d_walk.txt", None) else {
+        return;
+    };
+    let done = retarget(&clip, &skeleton, &Options::default()).unwrap();
+    assert_good(&done.report, 0.01);
+}
+
+#[test]
+fn what_is_no_motion_of_a_humanoid_is_refused() {
+    let skeleton = humanoid();
+    let rest = skeleton.rest_qpos();
+    let good = rig(&skeleton, &rest, &[rest.clone(), rest.clone()], 1.0, 0.0);
+    let error = |change: &dyn Fn(&mut Clip)| {
+        let mut clip = good.clone();
+        change(&mut clip);
+        retarget(&clip, &skeleton, &Options::default())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(error(&|clip| clip.frames.clear()).contains("no frames"));
+    assert!(error(&|clip| clip.fps = 0.0).contains("0 Hz"));
+    assert!(error(&|clip| drop(clip.frames[1].pop())).contains("frame 1"));
+    assert!(error(&|clip| clip.frames[1][2].translation.x = f64::NAN).contains("frame 1"));
+    assert!(
+        error(&|clip| clip
+            .joints
+            .iter_mut()
+            .for_each(|j| j.rest.translation.vector *= 0.0))
+        .contains("no")
+    );
+    assert!(retarget(&good, &skeleton, &Options::default()).is_ok());
 }
