@@ -11,9 +11,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Weights of the residuals; points count in metres with weight 1.
 pub(super) mod weight {
     /// Standing points, per metre.
-    pub const STANCE: f64 = 8.0;
+    pub const STANCE: f64 = 12.0;
     /// Points below the ground, per metre.
-    pub const GROUND: f64 = 8.0;
+    pub const GROUND: f64 = 16.0;
     /// Coordinates outside of their limits, per radian.
     pub const LIMIT: f64 = 3.0;
     /// Every coordinate's distance from the guess, per radian; decides what nothing else does.

@@ -10,9 +10,12 @@ use nalgebra::{Matrix3, Vector3};
 /// Most steps.
 const ITERATIONS: usize = 15;
 /// Relative gain below which the search ends.
-const GAIN: f64 = 1e-4;
+const GAIN: f64 = 1e-3;
 /// Damping at the start, relative to the mean diagonal.
 const DAMPING: f64 = 1e-5;
+/// Change of the damping after a step that gained, and after one that did not.
+const ON_GAIN: f64 = 0.3;
+const ON_LOSS: f64 = 30.0;
 /// Rounds in which the seam of a cycle is brought into a step.
 const SEAM_ROUNDS: usize = 4;
 
@@ -61,7 +64,7 @@ impl<'a> Solver<'a> {
         let mut damping = DAMPING;
         for step in 0..ITERATIONS {
             let Some(trial) = self.trial(frames, &mut system, damping) else {
-                damping *= 100.0;
+                damping *= ON_LOSS;
                 self.assemble(frames, &mut system);
                 continue;
             };
@@ -69,7 +72,7 @@ impl<'a> Solver<'a> {
             if trial_cost < cost {
                 let gain = (cost - trial_cost) / cost;
                 (*frames, cost) = (trial, trial_cost);
-                damping *= 0.1;
+                damping *= ON_GAIN;
                 if gain < GAIN {
                     return step + 1;
                 }
@@ -77,7 +80,7 @@ impl<'a> Solver<'a> {
                 if trial_cost <= cost * (1.0 + GAIN) {
                     return step + 1;
                 }
-                damping *= 100.0;
+                damping *= ON_LOSS;
                 self.assemble(frames, &mut system);
             }
         }
