@@ -3,11 +3,16 @@
 use crate::failure::{Failure, Outcome};
 use rerun::SpawnOptions;
 use std::fmt::Display;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Version of the recordings that we write. Viewers read those of their own version best.
 pub const VERSION: &str = "0.36.3";
+
+/// How long a viewer may take to answer.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 pub struct Viewer {
     path: PathBuf,
@@ -79,6 +84,24 @@ pub fn address(place: &str) -> String {
     } else {
         format!("rerun+http://{place}/proxy")
     }
+}
+
+/// Whether somebody listens at `address`; a recording sent to nobody would wait for ever.
+pub fn reach(address: &str) -> Outcome {
+    let place = address.split("://").last().unwrap_or_default();
+    let place = place.split('/').next().unwrap_or_default();
+    let found = place.to_socket_addrs().map_err(|e| {
+        Failure::user(format!(
+            "`{address}` is no address of a viewer ({e}), give one as host:port"
+        ))
+    })?;
+    let answers = |at| TcpStream::connect_timeout(&at, PATIENCE).is_ok();
+    if found.into_iter().any(answers) {
+        return Ok(());
+    }
+    Err(Failure::work(format!(
+        "no viewer listens at `{place}`, start one with `rerun`"
+    )))
 }
 
 /// How to get the viewer.

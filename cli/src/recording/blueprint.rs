@@ -48,39 +48,40 @@ fn log(layout: &Layout, shown: &Recording) -> RecordingStreamResult<()> {
     let mut plots = Vec::new();
     if !shown.rewards.is_empty() {
         plots.push((
-            plot(layout, 2, "reward terms", "plots/rewards", Some([0.0, 1.0]))?,
-            3.0,
+            plot(
+                layout,
+                2,
+                "reward terms",
+                "plots/rewards",
+                Some([0.0, 1.0]),
+                Corner2D::LeftBottom,
+            )?,
+            3.6,
         ));
     }
     let lanes = 0.6 + 0.45 * (shown.contact_parts.len() * shown.actors().count()) as f32;
-    plots.push((
-        states(layout, 3, "ground contact", "plots/contacts")?,
-        lanes,
-    ));
-    plots.push((
-        plot(
-            layout,
+    let contacts = layout.view(3, "StateTimeline", "ground contact", "plots/contacts")?;
+    plots.push((contacts, lanes));
+    for (number, name, origin, range, share) in [
+        (
             4,
             "height of the centre of mass, m",
             "plots/com_height",
             None,
-        )?,
-        2.0,
-    ));
-    plots.push((
-        plot(
-            layout,
+            2.0,
+        ),
+        (
             5,
             "angular momentum, kg·m²/s",
             "plots/angular_momentum",
             None,
-        )?,
-        2.0,
-    ));
-    plots.push((
-        plot(layout, 6, "phase", "plots/phase", Some([0.0, 1.0]))?,
-        1.2,
-    ));
+            2.0,
+        ),
+        (6, "phase", "plots/phase", Some([0.0, 1.0]), 1.2),
+    ] {
+        let view = plot(layout, number, name, origin, range, Corner2D::LeftTop)?;
+        plots.push((view, share));
+    }
     let (views, shares): (Vec<_>, Vec<_>) = plots.into_iter().unzip();
     let side = layout.container(100, ContainerKind::Vertical, &views, |c| {
         c.with_row_shares(shares)
@@ -120,15 +121,15 @@ fn eye(shown: &Recording) -> EyeControls3D {
         .iter()
         .fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));
     let follows = (high - low).xy().norm() > FOLLOW_BEYOND;
-    let aside = Vector3::new(0.0, shown.beside / 2.0, 0.0);
+    let aside = Vector3::new(0.0, -shown.beside / 2.0, 0.0);
     let middle = aside + if follows { start } else { (low + high) / 2.0 };
     let width = if follows {
         0.0
     } else {
         (high - low).xy().norm()
     };
-    let distance = 2.4 + 0.9 * width + 0.8 * shown.beside;
-    let direction = Rotation3::from_euler_angles(0.0, -0.22, 0.85) * Vector3::x();
+    let distance = 2.1 + 0.9 * width + 0.8 * shown.beside;
+    let direction = Rotation3::from_euler_angles(0.0, -0.26, 0.85) * Vector3::x();
     let target = Vector3::new(middle.x, middle.y, middle.z.max(0.6) - 0.1);
     let place = target + direction * distance;
     let eye = EyeControls3D::new()
@@ -152,9 +153,10 @@ fn plot(
     name: &str,
     origin: &str,
     range: Option<[f64; 2]>,
+    legend: Corner2D,
 ) -> RecordingStreamResult<String> {
     let view = layout.view(number, "TimeSeries", name, origin)?;
-    let legend = PlotLegend::new().with_corner(Corner2D::RightTop);
+    let legend = PlotLegend::new().with_corner(legend);
     layout.property(&view, "PlotLegend", &legend)?;
     if let Some([low, high]) = range {
         let room = 0.05 * (high - low);
@@ -162,10 +164,6 @@ fn plot(
         layout.property(&view, "ScalarAxis", &axis)?;
     }
     Ok(view)
-}
-
-fn states(layout: &Layout, number: u8, name: &str, origin: &str) -> RecordingStreamResult<String> {
-    layout.view(number, "StateTimeline", name, origin)
 }
 
 /// The blueprint's store.

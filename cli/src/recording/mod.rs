@@ -68,7 +68,7 @@ pub struct Recording {
     pub phase: Vec<f64>,
     /// Reward terms, each from 0 to 1.
     pub rewards: Vec<Curve>,
-    /// Metres by which the reference stands to the left of the agent.
+    /// Metres by which the reference stands to the right of the agent.
     pub beside: f64,
 }
 

@@ -26,7 +26,7 @@ pub fn log(
         let branch = format!("world/{name}");
         let lead = shown.agent.is_none() || name == "agent";
         if name == "reference" {
-            let aside = [0.0, shown.beside as f32, 0.0];
+            let aside = [0.0, -shown.beside as f32, 0.0];
             stream.log_static(branch.as_str(), &Transform3D::from_translation(aside))?;
         }
         bodies(stream, &branch, shown, actor, lead, times)?;

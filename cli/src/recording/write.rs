@@ -3,10 +3,14 @@
 use super::{Recording, blueprint, scene, series};
 use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimeColumn};
 use std::path::PathBuf;
+use std::time::Duration;
 
 pub const APPLICATION: &str = "mimic";
 /// Seconds from the first frame.
 pub const TIMELINE: &str = "time";
+
+/// How long a viewer may take to receive everything.
+const FLUSH: Duration = Duration::from_secs(30);
 
 pub enum Sink {
     File(PathBuf),
@@ -22,7 +26,7 @@ pub fn write(shown: &Recording, sink: &Sink) -> Result<(), Box<dyn std::error::E
         Sink::Viewer(address) => builder.connect_grpc_opts(address)?,
     };
     log(&stream, shown)?;
-    Ok(stream.flush_blocking()?)
+    Ok(stream.flush_with_timeout(FLUSH)?)
 }
 
 fn log(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {

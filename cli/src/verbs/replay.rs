@@ -160,6 +160,7 @@ pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
 }
 
 fn send(shown: &Recording, address: String) -> Outcome {
+    viewer::reach(&address)?;
     let failed = |e| Failure::work(format!("cannot send the recording to `{address}`: {e}"));
     recording::write(shown, &Sink::Viewer(address.clone())).map_err(failed)
 }

@@ -7,7 +7,19 @@ fn help_and_version_succeed() {
     let bench = Workbench::new();
     bench.mimic(&["--help"]).assert().success();
     bench.mimic(&["--version"]).assert().success();
-    for verb in ["info", "import", "doctor", "completions", "man"] {
+    for verb in [
+        "info",
+        "import",
+        "retarget",
+        "tracks",
+        "train",
+        "eval",
+        "replay",
+        "bench",
+        "doctor",
+        "completions",
+        "man",
+    ] {
         let output = bench.mimic(&[verb, "--help"]).assert().success();
         let text = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
         assert!(text.contains("Examples:"), "{verb} shows examples");
@@ -24,6 +36,9 @@ fn a_typo_in_a_flag_or_verb_is_wrong_usage() {
         &["import", "sway.txt", "--fps", "fast"],
         &["import", "sway.txt", "--trim", "2..1"],
         &["import", "sway.txt", "--up", "w"],
+        &["train", "sway.txt", "--samples", "many"],
+        &["train", "sway.txt", "--resume", "sway"],
+        &["eval", "--episodes", "0"],
         &[],
     ] {
         bench.mimic(line).assert().code(2);

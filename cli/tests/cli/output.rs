@@ -128,7 +128,9 @@ fn completions_and_manual_know_every_verb() {
     let output = bench.mimic(&["completions", "bash"]).assert().success();
     let script = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
     bench.mimic(&["man", "--out", "man"]).assert().success();
-    for verb in ["info", "import", "doctor"] {
+    for verb in [
+        "info", "import", "retarget", "tracks", "train", "eval", "replay", "bench", "doctor",
+    ] {
         assert!(script.contains(verb));
         let page = std::fs::read_to_string(bench.path(&format!("man/mimic-{verb}.1")));
         assert!(page.is_ok_and(|page| page.contains("Examples:")), "{verb}");

@@ -140,6 +140,10 @@ fn replay_without_a_viewer_says_how_to_get_one() {
     assert!(said.contains("pip install rerun-sdk=="), "{said}");
     assert!(said.contains("--save"), "{said}");
     bench.mimic(&["replay", "sway.txt"]).assert().code(2);
+    let said = bench.complaint(&["replay", "sway.txt", "--connect", "127.0.0.1:1"], 1);
+    assert!(said.contains("no viewer listens"), "{said}");
+    let said = bench.complaint(&["replay", "sway.txt", "--connect", "nonsense"], 2);
+    assert!(said.contains("host:port"), "{said}");
 }
 
 #[test]
