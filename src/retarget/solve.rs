@@ -13,6 +13,8 @@ const ITERATIONS: usize = 15;
 const GAIN: f64 = 1e-3;
 /// Damping at the start, relative to the mean diagonal.
 const DAMPING: f64 = 1e-5;
+/// Damping at which a step that gains nothing ends the search.
+const STIFF: f64 = 0.1;
 /// Change of the damping after a step that gained, and after one that did not.
 const ON_GAIN: f64 = 0.3;
 const ON_LOSS: f64 = 30.0;
@@ -77,7 +79,7 @@ impl<'a> Solver<'a> {
                     return step + 1;
                 }
             } else {
-                if trial_cost <= cost * (1.0 + GAIN) {
+                if damping > STIFF {
                     return step + 1;
                 }
                 damping *= ON_LOSS;

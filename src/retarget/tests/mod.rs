@@ -374,3 +374,18 @@ fn what_is_no_motion_of_a_humanoid_is_refused() {
     );
     assert!(retarget(&good, &skeleton, &Options::default()).is_ok());
 }
+
+#[test]
+fn the_shortest_clips_work() {
+    let skeleton = humanoid();
+    let rest = skeleton.rest_qpos();
+    for count in 1..8 {
+        for loop_mode in [LoopMode::Clamp, LoopMode::Wrap] {
+            let mut clip = rig(&skeleton, &rest, &vec![rest.clone(); count], 1.0, 0.0);
+            clip.loop_mode = loop_mode;
+            let done = on_humanoid(&clip);
+            assert_eq!(done.motion.qpos.len(), count);
+            assert!(done.motion.qpos.iter().flatten().all(|x| x.is_finite()));
+        }
+    }
+}
