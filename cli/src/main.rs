@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let cli = args::Cli::parse();
-    let mut printer = printer::Printer::new(&cli.talk);
-    let outcome = verbs::run(cli.verb, &cli.library, &mut printer);
+    let printer = printer::Printer::new(&cli.talk);
+    let outcome = verbs::run(cli.verb, &cli.library, &printer);
     printer.finish(outcome)
 }

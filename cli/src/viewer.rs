@@ -55,6 +55,7 @@ impl Viewer {
             executable_path: Some(self.path.display().to_string()),
             wait_for_bind: true,
             hide_welcome_screen: true,
+            extra_env: vec![("RUST_LOG".into(), "error".into())],
             ..SpawnOptions::default()
         };
         let viewer = rerun::spawn(&options).map_err(|e| self.broken(e))?;

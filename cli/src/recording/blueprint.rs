@@ -1,6 +1,7 @@
 //! How the viewer lays a recording out. The SDK's own builder can't set a view's eye, grid or legend, so the
 //! blueprint is logged piece by piece here.
 
+use super::scene::FOLLOWED;
 use super::write::{APPLICATION, TIMELINE};
 use super::{Recording, look};
 use nalgebra::{Rotation3, Vector3};
@@ -142,7 +143,7 @@ fn eye(shown: &Recording) -> EyeControls3D {
         } else {
             "reference"
         };
-        return eye.with_tracking_entity(format!("/world/{branch}/com"));
+        return eye.with_tracking_entity(format!("/world/{branch}/{FOLLOWED}"));
     }
     eye
 }

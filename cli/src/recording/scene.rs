@@ -14,6 +14,11 @@ const LONGEST_ARROW: f64 = 0.7;
 /// Angular momentum that is drawn that long at least, kg·m²/s: a still character shows no big arrows.
 const LEAST_MOMENTUM: f64 = 3.0;
 
+/// What the eye follows: the viewer frames its bounds, so two specks around the centre of mass give the distance.
+pub(super) const FOLLOWED: &str = "followed";
+/// From the centre of mass to each speck, metres.
+const FRAMED: [f64; 3] = [0.45, 0.45, 0.65];
+
 /// Logs everything below `world`.
 pub fn log(
     stream: &RecordingStream,
@@ -127,6 +132,20 @@ fn momentum(
             .with_colors([color])
             .with_radii([0.025]),
     )?;
+    let framed = Vector3::from(FRAMED);
+    let specks: Vec<_> = actor
+        .com
+        .iter()
+        .flat_map(|com| [vec3(&(com - framed)), vec3(&(com + framed))])
+        .collect();
+    let lengths = vec![2; actor.com.len()];
+    let specks = Points3D::update_fields()
+        .with_positions(specks)
+        .columns(lengths)?;
+    let speck = Points3D::update_fields().with_radii([0.0002]);
+    stream.log_static(format!("{branch}/{FOLLOWED}"), &speck)?;
+    stream.send_columns(format!("{branch}/{FOLLOWED}"), times.to_vec(), specks)?;
+
     let com = actor.com.iter().map(vec3);
     let points = Points3D::update_fields().with_positions(com.clone());
     stream.send_columns(path, times.to_vec(), points.columns_of_unit_batches()?)?;

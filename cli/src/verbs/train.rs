@@ -281,7 +281,7 @@ fn count(text: &str) -> Result<u64, String> {
         .parse()
         .map_err(|_| "give a number, e.g. 5M or 800k".to_string())?;
     let value = value * factor;
-    if value >= 1.0 && value <= 1e15 {
+    if (1.0..=1e15).contains(&value) {
         Ok(value as u64)
     } else {
         Err("at least 1 is needed".into())
