@@ -69,6 +69,15 @@ impl Clip {
     }
 
     /// The bytes of the clip's file.
+    /// Rounds all transforms to what the clip's file can hold, so that a clip is the same whether it comes from a file
+    /// of its own or straight from the importer.
+    pub(crate) fn round_to_file(&mut self) {
+        let rests = self.joints.iter_mut().map(|joint| &mut joint.rest);
+        for at in rests.chain(self.frames.iter_mut().flatten()) {
+            *at = rounded(at);
+        }
+    }
+
     fn to_bytes(&self) -> Result<Vec<u8>, String> {
         let header = Header {
             format: FORMAT.to_owned(),
@@ -251,7 +260,7 @@ fn isometries(
     let places = translation.as_chunks::<3>().0;
     let turns = rotation.as_chunks::<4>().0;
     let isometry = |(i, (t, q)): (usize, (&[f64; 3], &[f64; 4]))| {
-        let q = UnitQuaternion::try_new(Quaternion::new(q[0], q[1], q[2], q[3]), 1e-3);
+        let q = unit(Quaternion::new(q[0], q[1], q[2], q[3]));
         let q = q.ok_or_else(|| format!("tensor `{name}`: rotation {i} is zero"))?;
         Ok(Isometry3::from_parts(
             Translation3::new(t[0], t[1], t[2]),
@@ -259,6 +268,23 @@ fn isometries(
         ))
     };
     places.iter().zip(turns).enumerate().map(isometry).collect()
+}
+
+/// A quaternion that is a rotation but for single precision is taken as it stands: rounding it again changes nothing.
+fn unit(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
+    if (q.norm_squared() - 1.0).abs() < 1e-6 {
+        return Some(UnitQuaternion::new_unchecked(q));
+    }
+    UnitQuaternion::try_new(q, 1e-3)
+}
+
+fn rounded(at: &Isometry3<f64>) -> Isometry3<f64> {
+    let single = |x: f64| f64::from(x as f32);
+    let q = at.rotation.coords.map(single);
+    Isometry3::from_parts(
+        Translation3::from(at.translation.vector.map(single)),
+        UnitQuaternion::new_unchecked(Quaternion::from(q)),
+    )
 }
 
 fn joints(

@@ -110,6 +110,7 @@ pub fn read(
         .map(|b| format!("{b:02x}"))
         .collect();
     clip.problems.extend(note);
+    clip.round_to_file();
     Ok(clip)
 }
 

@@ -49,20 +49,10 @@ fn every_way_to_a_motion_leads_to_the_same_motion() {
         ])
         .assert()
         .success();
-    let momentum = |folder: &str| {
-        bench.json(&["tracks", &format!("{folder}/sway.motion")])["linear_momentum"]["max"].as_f64()
-    };
-    let (direct, by_clip) = (
-        momentum("direct").unwrap_or(0.0),
-        momentum("by-clip").unwrap_or(1.0),
-    );
-    assert!(
-        (direct - by_clip).abs() < 1e-4 * direct,
-        "a clip file holds f32: {direct} {by_clip}"
-    );
     let read = |folder: &str| std::fs::read(bench.path(&format!("{folder}/sway.motion"))).ok();
     assert!(read("direct").is_some_and(|bytes| bytes.len() > 1000));
     let tracks = |folder: &str| bench.json(&["tracks", &format!("{folder}/sway.motion")]);
+    assert_eq!(read("direct"), read("by-clip"));
     assert_eq!(tracks("direct"), tracks("mapped"));
     assert_eq!(tracks("direct"), bench.json(&["tracks", "sway.txt"]));
 }
