@@ -47,6 +47,8 @@ pub(super) struct Curve {
     keys: Vec<Key>,
     before: Beyond,
     after: Beyond,
+    /// Units per tick at the last key.
+    end_slope: f64,
     /// Keys were out of order or not finite.
     pub mended: bool,
 }
@@ -66,11 +68,17 @@ impl Curve {
             raw.sort_by(|a, b| a.tick.total_cmp(&b.tick));
             mended = true;
         }
+        if raw.is_empty() {
+            return Ok(None);
+        }
+        let (keys, end_slope) = keys(&raw, ticks);
         let beyond = |name| record.child(name).map_or(Beyond::Hold, beyond);
-        Ok((!raw.is_empty()).then(|| Self {
-            keys: keys(&raw, ticks),
-            before: beyond("Pre-Extrapolation"),
-            after: beyond("Post-Extrapolation"),
+        let (before, after) = (beyond("Pre-Extrapolation"), beyond("Post-Extrapolation"));
+        Ok(Some(Self {
+            keys,
+            before,
+            after,
+            end_slope,
             mended,
         }))
     }
@@ -105,7 +113,7 @@ impl Curve {
         if tick < first.tick {
             self.beyond(self.before, first, self.start_slope(), tick)
         } else if tick > last.tick {
-            self.beyond(self.after, last, self.end_slope(), tick)
+            self.beyond(self.after, last, self.end_slope, tick)
         } else {
             self.inside(tick)
         }
@@ -190,14 +198,6 @@ impl Curve {
             _ => 0.0,
         }
     }
-
-    /// Units per tick at the last key.
-    fn end_slope(&self) -> f64 {
-        match self.keys.as_slice() {
-            [.., key, next] => arriving_slope(key, next),
-            _ => 0.0,
-        }
-    }
 }
 
 fn leaving_slope(key: &Key, next: &Key) -> f64 {
@@ -209,7 +209,8 @@ fn leaving_slope(key: &Key, next: &Key) -> f64 {
     }
 }
 
-fn arriving_slope(key: &Key, next: &Key) -> f64 {
+/// Units per tick with which the curve arrives at `next` from `key`.
+pub(super) fn arriving_slope(key: &Key, next: &Key) -> f64 {
     let length = next.tick - key.tick;
     match key.segment {
         Segment::Cubic { arrive, .. } => ratio(arrive.rise, arrive.weight * length),

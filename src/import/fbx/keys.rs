@@ -1,8 +1,8 @@
 //! Keys of animation curves, from the file's arrays.
 
-use super::curve::{Beyond, Handle, Key, Segment};
+use super::curve::{Beyond, Handle, Key, Segment, arriving_slope};
 use super::document::{Array, Element};
-use super::tangent::{Attribute, Step, slopes};
+use super::tangent::{Attribute, Step, TANGENT_USER, slopes};
 use std::iter::repeat_n;
 
 const CONSTANT: u32 = 0x2;
@@ -82,8 +82,34 @@ fn attributes(
     }
 }
 
-/// Keys with their segments from ordered raw keys. `ticks` is ticks per second.
-pub(super) fn keys(raw: &[RawKey], ticks: f64) -> Vec<Key> {
+/// Keys with their segments from ordered raw keys, and the slope in units per tick with which the curve arrives at its
+/// last key. `ticks` is ticks per second.
+pub(super) fn keys(raw: &[RawKey], ticks: f64) -> (Vec<Key>, f64) {
+    let sides: Vec<_> = (0..raw.len()).map(|i| sides(raw, i, ticks)).collect();
+    let keys = raw.iter().enumerate().map(|(i, key)| {
+        let arriving = sides.get(i + 1).map_or(0.0, |side| side.0);
+        let next = raw.get(i + 1);
+        let seconds = next.map_or(0.0, |next| (next.tick - key.tick) / ticks);
+        let segment = segment(&key.attribute, sides[i].1, arriving, seconds);
+        Key {
+            tick: key.tick,
+            value: key.value,
+            segment,
+        }
+    });
+    let keys: Vec<Key> = keys.collect();
+    let computes = raw
+        .last()
+        .is_some_and(|key| is_cubic(&key.attribute) && !key.attribute.has(TANGENT_USER));
+    let end = match (keys.as_slice(), sides.last()) {
+        (_, Some(side)) if computes => side.0 / ticks,
+        ([.., key, next], _) => arriving_slope(key, next),
+        _ => 0.0,
+    };
+    (keys, end)
+}
+
+fn sides(raw: &[RawKey], index: usize, ticks: f64) -> (f64, f64) {
     let step = |a: &RawKey, b: &RawKey, weight: f64| {
         let time = (b.tick - a.tick) / ticks;
         (time > 0.0).then_some(Step {
@@ -92,30 +118,13 @@ pub(super) fn keys(raw: &[RawKey], ticks: f64) -> Vec<Key> {
             weight,
         })
     };
-    let sides: Vec<_> = (0..raw.len())
-        .map(|i| {
-            let (own, previous) = (&raw[i], i.checked_sub(1).map(|p| &raw[p]));
-            let before = previous.and_then(|p| step(p, own, p.attribute.next_left_weight()));
-            let after = raw
-                .get(i + 1)
-                .and_then(|n| step(own, n, own.attribute.right_weight()));
-            slopes_of(own, previous, before, after)
-        })
-        .collect();
-    (0..raw.len())
-        .map(|i| {
-            let arriving = sides.get(i + 1).map_or(0.0, |side| side.0);
-            let seconds = raw
-                .get(i + 1)
-                .map_or(0.0, |next| (next.tick - raw[i].tick) / ticks);
-            let segment = segment(&raw[i].attribute, sides[i].1, arriving, seconds);
-            Key {
-                tick: raw[i].tick,
-                value: raw[i].value,
-                segment,
-            }
-        })
-        .collect()
+    let own = &raw[index];
+    let previous = index.checked_sub(1).map(|previous| &raw[previous]);
+    let before = previous.and_then(|p| step(p, own, p.attribute.next_left_weight()));
+    let after = raw
+        .get(index + 1)
+        .and_then(|next| step(own, next, own.attribute.right_weight()));
+    slopes_of(own, previous, before, after)
 }
 
 /// A key that isn't cubic itself still ends a cubic segment, with the slope that the key before it holds.
@@ -125,20 +134,19 @@ fn slopes_of(
     before: Option<Step>,
     after: Option<Step>,
 ) -> (f64, f64) {
-    const USER: u32 = 0x400;
     let mut attribute = own.attribute;
-    if is_constant(&attribute) || !attribute.has(CUBIC) {
-        attribute.flags = USER;
+    if !is_cubic(&attribute) {
+        attribute.flags = TANGENT_USER;
     }
     slopes(before, after, previous.map(|key| key.attribute), attribute)
 }
 
-fn is_constant(attribute: &Attribute) -> bool {
-    attribute.has(CONSTANT)
+fn is_cubic(attribute: &Attribute) -> bool {
+    attribute.has(CUBIC) && !attribute.has(CONSTANT)
 }
 
 fn segment(attribute: &Attribute, leaving: f64, arriving: f64, seconds: f64) -> Segment {
-    if is_constant(attribute) {
+    if attribute.has(CONSTANT) {
         return if attribute.has(CONSTANT_NEXT) {
             Segment::HoldNext
         } else {

@@ -16,7 +16,11 @@ mod transform;
 #[cfg(test)]
 mod against_ufbx;
 #[cfg(test)]
+mod hostile;
+#[cfg(test)]
 mod rewritten;
+#[cfg(test)]
+mod synthetic;
 
 use crate::clip::{Problem, Severity};
 use crate::import::scene::{Node, Scene, Take};

@@ -1,7 +1,7 @@
 //! Slopes of cubic keys: automatic, TCB, and set by the user.
 
 const TANGENT_TCB: u32 = 0x200;
-const TANGENT_USER: u32 = 0x400;
+pub(super) const TANGENT_USER: u32 = 0x400;
 const CLAMP: u32 = 0x1000;
 const TIME_INDEPENDENT: u32 = 0x2000;
 const CLAMP_PROGRESSIVE: u32 = 0x4000;

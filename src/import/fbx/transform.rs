@@ -1,6 +1,6 @@
 //! From a node's transform properties to its place in the world, as FBX composes them.
 
-use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3};
 
 /// A transform property that a curve may drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,8 +131,10 @@ pub(super) fn to_euler(m: &Matrix3<f64>, order: Order) -> Vector3<f64> {
 
 /// The rotation from `a` to `b`, `weight` of the shorter way.
 pub(super) fn slerp(a: &Matrix3<f64>, b: &Matrix3<f64>, weight: f64) -> Matrix3<f64> {
-    let step = Rotation3::from_matrix_unchecked(a.transpose() * b);
-    a * Rotation3::new(step.scaled_axis() * weight).matrix()
+    let way = Rotation3::from_matrix_unchecked(a.transpose() * b);
+    // A quaternion's axis stays exact near 180°, where that of a matrix doesn't.
+    let step = UnitQuaternion::from_rotation_matrix(&way).powf(weight);
+    a * step.to_rotation_matrix().matrix()
 }
 
 /// A node in its parent: translate, rotate, scale.
