@@ -218,3 +218,36 @@ impl World {
         matrix
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn euler_angles_of_a_rotation_give_that_rotation_back() {
+        for code in 0..6 {
+            let order = rotation_order(code);
+            for step in 0..1000 {
+                let angle = |rate: f64| f64::from(step) * rate % 360.0 - 180.0;
+                // Every tenth has its middle angle at a pole.
+                let mut degrees = Vector3::new(angle(7.1), angle(13.3), angle(29.7));
+                if step % 10 == 0 {
+                    degrees[order[1]] = 90f64.copysign(degrees[0]);
+                }
+                let rotation = from_euler(degrees, order);
+                assert_relative_eq!(
+                    from_euler(to_euler(&rotation, order), order),
+                    rotation,
+                    epsilon = 1e-7
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn xyz_turns_about_x_first() {
+        let turned = from_euler(Vector3::new(90.0, 0.0, 90.0), XYZ) * Vector3::y();
+        assert_relative_eq!(turned, Vector3::z(), epsilon = 1e-15);
+    }
+}
