@@ -1,16 +1,18 @@
 //! FBX, binary, versions 7.0 to 7.9.
 
+mod array;
 mod curve;
 mod document;
-mod inflate;
 mod keys;
 mod layers;
 mod nodes;
 mod objects;
 mod properties;
+mod scan;
 mod settings;
 mod takes;
 mod tangent;
+mod tape;
 mod transform;
 
 #[cfg(test)]

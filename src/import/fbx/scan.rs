@@ -1,0 +1,180 @@
+//! Checks before `fbxcel` reads a file, and the few bytes that it must see changed.
+//!
+//! `fbxcel` trusts the file's lengths: it adds them unchecked, follows values beyond their record, nests as deep as the
+//! file says and opens a decoder on compressed arrays that are shorter than what the decoder reads first. So every
+//! length is checked here against the record that holds it.
+
+use super::FbxError;
+
+/// Real files nest about eight records deep.
+const MAX_DEPTH: usize = 64;
+/// Count, encoding and byte length of an array.
+pub(super) const ARRAY_HEADER: usize = 12;
+
+/// A copy of `bytes` that `fbxcel` reads without fail, as long as its records end where they say. Every byte keeps its
+/// place; `start` is the first record's, and `wide` says whether record headers are 64-bit.
+///
+/// Changed are names outside ASCII, which `fbxcel` refuses if they aren't UTF-8; type letters that it doesn't know, to
+/// those of the same layout; and the encoding of arrays, to none, so that it skips them without opening a decoder.
+pub(super) fn readable(bytes: &[u8], start: usize, wide: bool) -> Result<Vec<u8>, FbxError> {
+    let mut scan = Scan {
+        bytes,
+        wide,
+        copy: bytes.to_vec(),
+    };
+    scan.list(start, bytes.len(), 0)?;
+    Ok(scan.copy)
+}
+
+pub(super) fn broken(at: usize, reason: &str) -> FbxError {
+    FbxError::Broken {
+        place: format!("byte {at}"),
+        reason: reason.into(),
+    }
+}
+
+/// Little-endian; missing bytes count as zero.
+pub(super) fn word(bytes: &[u8]) -> u32 {
+    bytes
+        .iter()
+        .take(4)
+        .rev()
+        .fold(0, |n, &byte| n << 8 | u32::from(byte))
+}
+
+struct Scan<'a> {
+    bytes: &'a [u8],
+    wide: bool,
+    copy: Vec<u8>,
+}
+
+struct Header {
+    end: usize,
+    values: u64,
+    values_len: usize,
+    name_len: usize,
+}
+
+impl Header {
+    fn is_end_marker(&self) -> bool {
+        self.end == 0 && self.values == 0 && self.values_len == 0 && self.name_len == 0
+    }
+}
+
+impl<'a> Scan<'a> {
+    /// Records from `at` up to `end`, or up to an end marker; `fbxcel` refuses a file where that isn't the same.
+    fn list(&mut self, mut at: usize, end: usize, depth: usize) -> Result<(), FbxError> {
+        if depth > MAX_DEPTH {
+            return Err(broken(at, "records are nested too deep"));
+        }
+        while depth == 0 || at < end {
+            let (header, name_at) = self.header(at, end)?;
+            if header.is_end_marker() {
+                return Ok(());
+            }
+            if header.end <= at || header.end > end {
+                let reason = "a record ends outside the record that holds it";
+                return Err(broken(at, reason));
+            }
+            let values_at = self.name(name_at, header.name_len, header.end)?;
+            self.slice(values_at, header.values_len, header.end)?;
+            let children_at = values_at + header.values_len;
+            self.values(values_at, children_at, header.values)?;
+            self.list(children_at, header.end, depth + 1)?;
+            at = header.end;
+        }
+        Ok(())
+    }
+
+    fn header(&self, at: usize, end: usize) -> Result<(Header, usize), FbxError> {
+        let size = if self.wide { 8 } else { 4 };
+        let bytes = self.slice(at, 3 * size + 1, end)?;
+        let number = |i: usize| {
+            bytes[i * size..(i + 1) * size]
+                .iter()
+                .rev()
+                .fold(0u64, |n, &byte| n << 8 | u64::from(byte))
+        };
+        let length =
+            |n: u64| usize::try_from(n).map_err(|_| broken(at, "a length is out of range"));
+        let header = Header {
+            end: length(number(0))?,
+            values: number(1),
+            values_len: length(number(2))?,
+            name_len: usize::from(bytes[3 * size]),
+        };
+        Ok((header, at + bytes.len()))
+    }
+
+    fn slice(&self, at: usize, len: usize, end: usize) -> Result<&'a [u8], FbxError> {
+        let stop = at.checked_add(len).filter(|&stop| stop <= end);
+        stop.and_then(|stop| self.bytes.get(at..stop))
+            .ok_or_else(|| broken(at, "the data ends early"))
+    }
+
+    /// Gives the byte after the name.
+    fn name(&mut self, at: usize, len: usize, end: usize) -> Result<usize, FbxError> {
+        let name = self.slice(at, len, end)?;
+        for (place, byte) in (at..).zip(name) {
+            if !byte.is_ascii() {
+                self.patch(place, b'?');
+            }
+        }
+        Ok(at + len)
+    }
+
+    fn values(&mut self, mut at: usize, end: usize, count: u64) -> Result<(), FbxError> {
+        for _ in 0..count {
+            at = self.value(at, end)?;
+        }
+        if at == end {
+            Ok(())
+        } else {
+            Err(broken(at, "a record's values don't fill their length"))
+        }
+    }
+
+    /// Gives the byte after the value.
+    fn value(&mut self, at: usize, end: usize) -> Result<usize, FbxError> {
+        let kind = self.slice(at, 1, end)?[0];
+        let body = at + 1;
+        let len = match kind {
+            b'C' | b'B' | b'Z' => {
+                self.patch(at, b'C');
+                1
+            }
+            b'Y' => 2,
+            b'I' | b'F' => 4,
+            b'L' | b'D' => 8,
+            b'S' | b'R' => 4 + self.length(body, end)?,
+            b'b' | b'c' => {
+                self.patch(at, b'b');
+                self.array(body, end)?
+            }
+            b'f' | b'd' | b'i' | b'l' => self.array(body, end)?,
+            _ => return Err(broken(at, "a value has an unknown type")),
+        };
+        self.slice(body, len, end)?;
+        Ok(body + len)
+    }
+
+    fn length(&self, at: usize, end: usize) -> Result<usize, FbxError> {
+        self.slice(at, 4, end).map(|bytes| word(bytes) as usize)
+    }
+
+    /// Gives the array's length with its header.
+    fn array(&mut self, at: usize, end: usize) -> Result<usize, FbxError> {
+        let encoding = at + 4;
+        if self.length(encoding, end)? > 1 {
+            return Err(broken(at, "an array has an unknown encoding"));
+        }
+        self.patch(encoding, 0);
+        Ok(ARRAY_HEADER + self.length(at + 8, end)?)
+    }
+
+    fn patch(&mut self, at: usize, byte: u8) {
+        if let Some(place) = self.copy.get_mut(at) {
+            *place = byte;
+        }
+    }
+}
