@@ -208,7 +208,7 @@ impl Trainer {
 
     /// Whether the run stands between two rounds, where it can be saved and resumed to the same bits.
     pub fn is_between_rounds(&self) -> bool {
-        self.iteration % self.plan.round.max(1) == 0
+        self.iteration.is_multiple_of(self.plan.round.max(1))
     }
 
     pub fn state(&self) -> TrainerState {
