@@ -1,6 +1,7 @@
 //! Which way a character faces, and the turn about Z that makes it face +X.
 
 use crate::clip::Joint;
+use crate::humanoid::{self, HumanoidMap, Slot};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -11,10 +12,35 @@ const SNAP: f64 = 10.0 * PI / 180.0;
 /// Left and right places of paired joints (hips, shoulders), in canonical axes.
 pub(crate) type Pair = (Vector3<f64>, Vector3<f64>);
 
-/// Places at rest of the joints that a rig names alike but for their side.
+/// Figures with more joints than this are no humanoids, and looking for one among them takes long.
+const MOST_JOINTS: usize = 4096;
+
+/// Places at rest of a humanoid's hips and shoulders, or, in other figures, of the joints that a rig names alike but
+/// for their side.
 ///
 /// `joints` and `world` (their world transforms) run in parallel.
 pub(crate) fn pairs(joints: &[Joint], world: &[Isometry3<f64>]) -> Vec<Pair> {
+    if joints.len() <= MOST_JOINTS
+        && let Ok(map) = humanoid::map(joints)
+    {
+        return limbs(&map, world);
+    }
+    named_pairs(joints, world)
+}
+
+fn limbs(map: &HumanoidMap, world: &[Isometry3<f64>]) -> Vec<Pair> {
+    let place = |slot| Some(world.get(map.joint(slot)?)?.translation.vector);
+    let sides = [
+        (Slot::LeftUpperLeg, Slot::RightUpperLeg),
+        (Slot::LeftUpperArm, Slot::RightUpperArm),
+    ];
+    sides
+        .into_iter()
+        .filter_map(|(left, right)| Some((place(left)?, place(right)?)))
+        .collect()
+}
+
+fn named_pairs(joints: &[Joint], world: &[Isometry3<f64>]) -> Vec<Pair> {
     let place = |at: &Isometry3<f64>| at.translation.vector;
     let lefts: BTreeMap<String, Vector3<f64>> = joints
         .iter()

@@ -35,6 +35,11 @@ use std::path::Path;
 /// Largest animation file that is read, in bytes.
 const MOST_BYTES: u64 = 2 << 30;
 
+/// Frames × joints that any file may be sampled to, and how many more per byte of it: a few bytes can tell of hours,
+/// but motion that fills them takes more.
+const FREE_TRANSFORMS: usize = 1 << 20;
+const TRANSFORMS_PER_BYTE: f64 = 0.5;
+
 /// How a file is to be read, where it shouldn't decide itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
@@ -104,7 +109,8 @@ pub fn read(
 ) -> Result<Clip, Error> {
     let scene = open(bytes, file, folder)?;
     let (take, note) = take::choose(scene.as_ref(), file, options.take.as_deref())?;
-    let mut clip = clip(scene.as_ref(), file, take, options)?;
+    let most = FREE_TRANSFORMS + (bytes.len() as f64 * TRANSFORMS_PER_BYTE) as usize;
+    let mut clip = clip(scene.as_ref(), file, take, options, most)?;
     clip.source.sha256 = Sha256::digest(bytes)
         .iter()
         .map(|b| format!("{b:02x}"))
@@ -191,7 +197,14 @@ fn frame(scene: &dyn Scene, file: &str, options: &Options) -> Result<Frame, Erro
     Ok(Frame { axes, unit_m })
 }
 
-fn clip(scene: &dyn Scene, file: &str, take: usize, options: &Options) -> Result<Clip, Error> {
+/// Samples a take, to `most` frames × joints at most.
+fn clip(
+    scene: &dyn Scene,
+    file: &str,
+    take: usize,
+    options: &Options,
+    most: usize,
+) -> Result<Clip, Error> {
     let about = &scene.takes()[take];
     let (start, end) = span(about, file, options.trim)?;
     let rig = Rig::new(
@@ -201,7 +214,7 @@ fn clip(scene: &dyn Scene, file: &str, take: usize, options: &Options) -> Result
         Some((take, start)),
     )?;
     let fps = options.fps.unwrap_or(about.fps);
-    let grid = grid(scene, file, about, end - start, fps)?;
+    let grid = grid(scene, file, about, end - start, fps, most)?;
     let world = rig.frames(take, start, &grid)?;
     let mut problems = scene.problems().to_vec();
     problems.extend(sampling_problems(&grid, fps, &world));
@@ -212,7 +225,8 @@ fn clip(scene: &dyn Scene, file: &str, take: usize, options: &Options) -> Result
             .filter(|_| options.trim.is_none())
             .unwrap_or_else(|| seam::wraps(&world)),
     };
-    let frames = world.iter().map(|frame| rig.locals(frame)).collect();
+    let locals = |frame: Vec<_>| rig.locals(&frame);
+    let frames = world.into_iter().map(locals).collect();
     problems.extend(rig.problems);
     Ok(Clip {
         name: stem(file).to_owned(),
@@ -264,6 +278,7 @@ fn grid(
     take: &Take,
     duration: f64,
     fps: f64,
+    most: usize,
 ) -> Result<Grid, Error> {
     let nodes = scene.nodes().len();
     let Some(one) = Grid::new(0.0, fps, 2) else {
@@ -272,11 +287,13 @@ fn grid(
             fps,
         });
     };
-    Grid::new(duration, one.fps, MOST_TRANSFORMS / nodes.max(1)).ok_or_else(|| Error::TooLong {
-        file: file.to_owned(),
-        take: take.name.clone(),
-        frames: (duration * fps).round() + 1.0,
-        nodes,
+    Grid::new(duration, one.fps, most.min(MOST_TRANSFORMS) / nodes.max(1)).ok_or_else(|| {
+        Error::TooLong {
+            file: file.to_owned(),
+            take: take.name.clone(),
+            frames: (duration * fps).round() + 1.0,
+            nodes,
+        }
     })
 }
 

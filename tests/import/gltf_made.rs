@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 
 /// A two-joint file, in text, whose take is as `change` leaves it.
-fn synthetic(change: impl Fn(&mut Value)) -> String {
+pub fn synthetic(change: impl Fn(&mut Value)) -> String {
     // Times 0, 1 and two turns: none, and a quarter about z.
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let floats = [0.0_f32, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half];
@@ -31,7 +31,7 @@ fn synthetic(change: impl Fn(&mut Value)) -> String {
     file.to_string()
 }
 
-fn base64(bytes: &[u8]) -> String {
+pub fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();
     for group in bytes.chunks(3) {

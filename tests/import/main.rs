@@ -1,5 +1,7 @@
 //! Importers against evaluations of the formats' own formulas that share no code with them.
 
+mod beside;
+mod damage;
 mod deepmimic;
 mod gltf;
 mod gltf_made;

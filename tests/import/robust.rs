@@ -1,55 +1,12 @@
 //! Files that were cut, overwritten or flipped never bring the importer down.
 
+use super::damage::Damage;
 use super::data;
 use mimic::import::{self, Options};
 
-/// A small linear congruential generator (Knuth's MMIX constants), so that every run sees the same damage.
-struct Damage(u64);
-
-impl Damage {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % limit.max(1)
-    }
-
-    /// Cuts the end off, flips bits, or overwrites a few bytes with a length that is wrong.
-    fn apply(&mut self, bytes: &mut Vec<u8>, head: usize) {
-        match self.below(4) {
-            0 => bytes.truncate(self.below(bytes.len())),
-            1 => {
-                for _ in 0..=self.below(8) {
-                    let at = self.below(bytes.len());
-                    bytes[at] ^= 1 << self.below(8);
-                }
-            }
-            2 => {
-                let at = self.below(bytes.len().min(head));
-                let lengths: [u32; 5] = [0, 1, 0x7fff_ffff, 0xffff_ffff, 0x10_0000];
-                let length = lengths[self.below(lengths.len())].to_le_bytes();
-                let end = (at + 4).min(bytes.len());
-                bytes[at..end].copy_from_slice(&length[..end - at]);
-            }
-            _ => {
-                // A digit of a text, so that the JSON stays whole and its numbers go wrong.
-                let digits: Vec<usize> = (0..bytes.len().min(head))
-                    .filter(|&at| bytes[at].is_ascii_digit())
-                    .collect();
-                for _ in 0..=self.below(3) {
-                    if let Some(&at) = digits.get(self.below(digits.len())) {
-                        bytes[at] = b"0123456789"[self.below(10)];
-                    }
-                }
-            }
-        }
-    }
-}
-
 /// Damages `bytes` many times; reading may fail but must return, and what is returned must be whole.
 fn survives(name: &str, bytes: &[u8], rounds: usize) {
-    let mut damage = Damage(0x006d_696d_6963);
+    let mut damage = Damage::new();
     let mut refused = 0;
     for _ in 0..rounds {
         let mut damaged = bytes.to_vec();
@@ -76,11 +33,7 @@ fn survives(name: &str, bytes: &[u8], rounds: usize) {
 
 #[test]
 fn damaged_synthetic_files() {
-    survives(
-        "a.gltf",
-        super::gltf_made::synthetic_file().as_bytes(),
-        4000,
-    );
+    survives("a.gltf", super::gltf_made::synthetic_file().as_bytes(), 4000);
 }
 
 #[test]

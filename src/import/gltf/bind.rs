@@ -4,9 +4,10 @@
 //! pose that the character was modelled in: a joint stands in its parent by B⁻¹(parent) · B(joint).
 
 use super::accessor::Accessors;
-use super::document::{Document, Skin};
+use super::document::Document;
 use super::tree::Tree;
 use crate::import::rigid::rotation_of;
+use gltf::json::{Skin, accessor::Type};
 use nalgebra::{Matrix3, Matrix4};
 
 /// Nodes within this angle of their bind pose stand in it, in radians.
@@ -46,10 +47,12 @@ fn skin_pose(
     tree: &Tree,
     accessors: &mut Accessors<'_>,
 ) -> Option<Vec<(usize, Matrix4<f64>)>> {
-    let numbers = accessors.read(skin.inverse_bind_matrices?, "MAT4").ok()?;
+    let numbers = accessors
+        .read(skin.inverse_bind_matrices?, Type::Mat4)
+        .ok()?;
     let mut bind: Vec<Option<Matrix4<f64>>> = vec![None; tree.nodes.len()];
     for (joint, numbers) in skin.joints.iter().zip(numbers.chunks_exact(16)) {
-        let slot = bind.get_mut(*tree.place.get(*joint)?)?;
+        let slot = bind.get_mut(*tree.place.get(joint.value())?)?;
         *slot = Matrix4::from_column_slice(numbers).try_inverse();
     }
     let world = tree.rest_world();

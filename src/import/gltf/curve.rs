@@ -1,7 +1,7 @@
 //! One animated property of one node over time.
 
-use super::document::Interpolation;
 use crate::clip::slerp;
+use gltf::json::animation::Interpolation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::rc::Rc;
 

@@ -1,50 +1,33 @@
 //! The part of a glTF file's JSON that says how nodes move.
 //!
 //! Everything else (meshes, materials, textures) is left unread, so that faults there can't keep the motion from
-//! being imported. Names and meanings are those of the glTF 2.0 specification.
+//! being imported. Its entries are those of [`gltf::json`], which checks their kinds but no index.
 
 use super::GltfError;
+use gltf::json::animation::{Property, Sampler};
+use gltf::json::validation::{Checked, USize64};
+use gltf::json::{Accessor, Buffer, Index, Node, Skin, buffer};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
 use std::collections::BTreeMap;
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
-#[derive(Default)]
 pub(super) struct Document {
     pub nodes: Vec<Node>,
     pub skins: Vec<Skin>,
     pub animations: Vec<Animation>,
     pub accessors: Vec<Accessor>,
-    pub buffer_views: Vec<BufferView>,
+    pub buffer_views: Vec<buffer::View>,
     pub buffers: Vec<Buffer>,
     pub extensions_required: Vec<String>,
     pub extensions: Extensions,
+    #[serde(skip)]
+    extended: Extended,
 }
 
-#[derive(Deserialize, Default)]
-#[serde(default)]
-pub(super) struct Node {
-    pub name: Option<String>,
-    pub children: Vec<usize>,
-    /// Column by column.
-    pub matrix: Option<[f64; 16]>,
-    pub translation: Option<[f64; 3]>,
-    /// x, y, z, w.
-    pub rotation: Option<[f64; 4]>,
-    pub scale: Option<[f64; 3]>,
-    pub mesh: Option<IgnoredAny>,
-    pub camera: Option<IgnoredAny>,
-    pub extensions: BTreeMap<String, IgnoredAny>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Skin {
-    pub joints: Vec<usize>,
-    pub inverse_bind_matrices: Option<usize>,
-}
-
+/// An animation whose channels may lack a node, as those of extensions do; [`gltf::json::animation::Target`] wants one.
 #[derive(Deserialize)]
 pub(super) struct Animation {
     pub name: Option<String>,
@@ -56,80 +39,49 @@ pub(super) struct Animation {
 
 #[derive(Deserialize)]
 pub(super) struct Channel {
-    pub sampler: usize,
+    pub sampler: Index<Sampler>,
     pub target: Target,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Target {
-    pub node: Option<usize>,
-    pub path: String,
+    pub node: Option<Index<Node>>,
+    pub path: Checked<Property>,
 }
 
-#[derive(Deserialize)]
-pub(super) struct Sampler {
-    pub input: usize,
-    pub output: usize,
-    #[serde(default)]
-    pub interpolation: Interpolation,
+/// Names of the extensions of every node and buffer view, which [`gltf::json`] leaves out.
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Extended {
+    nodes: Vec<Names>,
+    buffer_views: Vec<Names>,
 }
 
-#[derive(Deserialize, Clone, Copy, Debug, Default, PartialEq)]
-#[serde(rename_all = "UPPERCASE")]
-pub(super) enum Interpolation {
-    #[default]
-    Linear,
-    Step,
-    CubicSpline,
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Names {
+    extensions: BTreeMap<String, IgnoredAny>,
 }
 
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Accessor {
-    pub buffer_view: Option<usize>,
-    #[serde(default)]
-    pub byte_offset: usize,
-    pub component_type: u32,
-    #[serde(default)]
-    pub normalized: bool,
-    pub count: usize,
-    #[serde(rename = "type")]
-    pub shape: String,
-    pub sparse: Option<Sparse>,
+impl Document {
+    /// Whether an extension makes a light of this node.
+    pub fn is_light(&self, node: usize) -> bool {
+        let names = self.extended.nodes.get(node);
+        names.is_some_and(|names| names.extensions.contains_key("KHR_lights_punctual"))
+    }
+
+    /// The extension that this buffer view's bytes are packed with.
+    pub fn packing(&self, view: usize) -> Option<&str> {
+        let mut names = self.extended.buffer_views.get(view)?.extensions.keys();
+        names
+            .find(|name| name.contains("meshopt_compression"))
+            .map(String::as_str)
+    }
 }
 
-#[derive(Deserialize)]
-pub(super) struct Sparse {
-    pub count: usize,
-    pub indices: SparsePart,
-    pub values: SparsePart,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SparsePart {
-    pub buffer_view: usize,
-    #[serde(default)]
-    pub byte_offset: usize,
-    /// Only the indices have one.
-    pub component_type: Option<u32>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct BufferView {
-    pub buffer: usize,
-    #[serde(default)]
-    pub byte_offset: usize,
-    pub byte_length: usize,
-    pub byte_stride: Option<usize>,
-    #[serde(default)]
-    pub extensions: BTreeMap<String, IgnoredAny>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Buffer {
-    pub uri: Option<String>,
+/// A size or offset; those that can't be addressed fit nowhere.
+pub(super) fn size(bytes: USize64) -> usize {
+    usize::try_from(bytes.0).unwrap_or(usize::MAX)
 }
 
 /// The extensions that name bones: VRM models, old and new, and VRM animations.
@@ -203,5 +155,31 @@ pub(super) fn parse(json: &[u8]) -> Result<Document, GltfError> {
     if !stamp.asset.version.starts_with("2.") {
         return Err(GltfError::Version(stamp.asset.version));
     }
-    serde_json::from_slice(json).map_err(GltfError::Json)
+    let document: Document = serde_json::from_slice(json)
+        .or_else(|e| without_extras(json).ok_or(e))
+        .map_err(GltfError::Json)?;
+    let extended = serde_json::from_slice(json).map_err(GltfError::Json)?;
+    Ok(Document {
+        extended,
+        ..document
+    })
+}
+
+/// The same without `extras`, which may be anything, but which [`gltf::json`] wants to be objects.
+fn without_extras(json: &[u8]) -> Option<Document> {
+    let mut value = serde_json::from_slice(json).ok()?;
+    drop_extras(&mut value);
+    serde_json::from_value(value).ok()
+}
+
+/// The parser bounds how deep values nest.
+fn drop_extras(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(drop_extras),
+        Value::Object(entries) => {
+            entries.remove("extras");
+            entries.values_mut().for_each(drop_extras);
+        }
+        _ => {}
+    }
 }

@@ -45,7 +45,7 @@ pub(crate) struct GltfScene {
 /// Reads a GLB file.
 pub(crate) fn read_glb(bytes: &[u8], folder: Option<&Path>) -> Result<GltfScene, GltfError> {
     let glb = container::split(bytes)?;
-    scene(&document::parse(glb.json)?, glb.bin, folder)
+    scene(&document::parse(&glb.json)?, glb.bin.as_deref(), folder)
 }
 
 /// Reads a `.gltf` file. Buffers in other files are looked for in `folder`, and nowhere else.

@@ -3,11 +3,14 @@
 use super::GltfError;
 use super::accessor::Accessors;
 use super::curve::Curve;
-use super::document::{Animation, Sampler};
+use super::document::Animation;
 use super::rate;
 use super::tree::{Placement, Tree};
 use crate::clip::{Problem, Severity};
 use crate::import::scene::Take;
+use gltf::json::accessor::Type;
+use gltf::json::animation::{Interpolation, Property, Sampler};
+use gltf::json::validation::Checked;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -92,12 +95,13 @@ pub(super) fn curves(
         let Some(node) = channel.target.node else {
             continue;
         };
-        let path = match channel.target.path.as_str() {
-            "translation" => "translation",
-            "rotation" => "rotation",
-            "scale" => "scale",
+        let path = match channel.target.path {
+            Checked::Valid(Property::Translation) => "translation",
+            Checked::Valid(Property::Rotation) => "rotation",
+            Checked::Valid(Property::Scale) => "scale",
             _ => continue,
         };
+        let node = node.value();
         let place = tree
             .place
             .get(node)
@@ -113,7 +117,7 @@ pub(super) fn curves(
             path,
             reason,
         };
-        let sampler = animation.samplers.get(channel.sampler);
+        let sampler = animation.samplers.get(channel.sampler.value());
         let sampler = sampler.ok_or_else(|| broken(format!("no sampler {}", channel.sampler)))?;
         if accessors.is_empty(sampler.input) {
             problems.push(problem("curve-without-keys", take, name, path));
@@ -150,9 +154,9 @@ fn vectors(
     accessors: &mut Accessors<'_>,
     broken: &dyn Fn(String) -> GltfError,
 ) -> Result<Curve<3>, GltfError> {
-    let times = accessors.read(sampler.input, "SCALAR")?;
-    let values = accessors.read(sampler.output, "VEC3")?;
-    Curve::new(times, values, sampler.interpolation).map_err(broken)
+    let times = accessors.read(sampler.input, Type::Scalar)?;
+    let values = accessors.read(sampler.output, Type::Vec3)?;
+    Curve::new(times, values, interpolation(sampler).map_err(broken)?).map_err(broken)
 }
 
 fn rotations(
@@ -160,12 +164,20 @@ fn rotations(
     accessors: &mut Accessors<'_>,
     broken: &dyn Fn(String) -> GltfError,
 ) -> Result<Curve<4>, GltfError> {
-    let times = accessors.read(sampler.input, "SCALAR")?;
-    let values = accessors.read(sampler.output, "VEC4")?;
-    let curve = Curve::<4>::new(times, values, sampler.interpolation).map_err(broken)?;
+    let times = accessors.read(sampler.input, Type::Scalar)?;
+    let values = accessors.read(sampler.output, Type::Vec4)?;
+    let curve =
+        Curve::<4>::new(times, values, interpolation(sampler).map_err(broken)?).map_err(broken)?;
     match curve.zero_key() {
         Some(key) => Err(broken(format!("the rotation of key {key} is zero"))),
         None => Ok(curve),
+    }
+}
+
+fn interpolation(sampler: &Sampler) -> Result<Interpolation, String> {
+    match sampler.interpolation {
+        Checked::Valid(interpolation) => Ok(interpolation),
+        Checked::Invalid => Err("an unknown interpolation".to_owned()),
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::GltfError;
 use super::curve::unit;
-use super::document::{Document, Node};
+use super::document::Document;
 use crate::import::rigid::rotation_of;
 use crate::import::scene;
+use gltf::json::{Index, Node};
 use nalgebra::{Matrix4, Rotation3, UnitQuaternion, Vector3};
 
 /// Translation, rotation and scale of a node in its parent.
@@ -60,15 +61,16 @@ impl Rest {
     }
 
     fn new(node: &Node) -> Self {
-        let matrix = node.matrix.map(|m| Matrix4::from_column_slice(&m));
+        let matrix = node
+            .matrix
+            .map(|m| Matrix4::from_column_slice(&m.map(f64::from)));
         let placement = match &matrix {
             Some(matrix) => parts(matrix),
             None => Placement {
-                translation: node.translation.map_or_else(Vector3::zeros, Vector3::from),
-                rotation: node.rotation.and_then(unit).unwrap_or_default(),
-                scale: node
-                    .scale
-                    .map_or_else(|| Vector3::repeat(1.0), Vector3::from),
+                translation: Vector3::from(node.translation.unwrap_or_default().map(f64::from)),
+                rotation: unit(node.rotation.unwrap_or_default().0.map(f64::from))
+                    .unwrap_or_default(),
+                scale: Vector3::from(node.scale.unwrap_or([1.0; 3]).map(f64::from)),
             },
         };
         Self { placement, matrix }
@@ -99,14 +101,14 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
     let skinned = document
         .skins
         .iter()
-        .flat_map(|skin| skin.joints.iter().copied());
+        .flat_map(|skin| skin.joints.iter().map(Index::value));
     for node in skinned.chain(document.extensions.bones()) {
         let mark = bone.get_mut(node).ok_or_else(|| missing(node))?;
         *mark = true;
     }
     let about = |&node: &usize| {
         let source = &document.nodes[node];
-        let light = source.extensions.contains_key("KHR_lights_punctual");
+        let holds = source.mesh.is_some() || source.camera.is_some() || document.is_light(node);
         scene::Node {
             name: source
                 .name
@@ -114,7 +116,7 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
                 .unwrap_or_else(|| format!("node {node}")),
             parent: parents[node].map(|parent| place[parent]),
             is_bone: bone[node],
-            is_plain: source.mesh.is_none() && source.camera.is_none() && !light,
+            is_plain: !holds,
         }
     };
     let nodes = order.iter().map(about).collect();
@@ -132,10 +134,14 @@ fn missing(node: usize) -> GltfError {
     }
 }
 
+fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
+    node.children.iter().flatten().map(Index::value)
+}
+
 fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
     let mut parents = vec![None; document.nodes.len()];
     for (parent, node) in document.nodes.iter().enumerate() {
-        for &child in &node.children {
+        for child in children(node) {
             let slot = parents.get_mut(child).ok_or_else(|| missing(child))?;
             if slot.replace(parent).is_some() {
                 let reason = "it has several parents".to_owned();
@@ -158,7 +164,7 @@ fn order(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, G
     let mut order = Vec::with_capacity(parents.len());
     while let Some(node) = waiting.pop() {
         order.push(node);
-        waiting.extend(document.nodes[node].children.iter().rev());
+        waiting.extend(children(&document.nodes[node]).rev());
     }
     if order.len() == parents.len() {
         return Ok(order);
