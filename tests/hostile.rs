@@ -72,39 +72,138 @@ fn deepmimic() -> Vec<u8> {
     .into_bytes()
 }
 
+/// Reads `bytes` and checks what that cost; whether they could be read.
+fn frugal(name: &str, bytes: &[u8]) -> Result<usize, Error> {
+    let start = Instant::now();
+    let (clip, peak) = HEAP.peak_of(|| import::read(bytes, name, None, &Options::default()));
+    let seconds = start.elapsed();
+    assert!(seconds < SOON, "{name}: {seconds:?}");
+    let transforms = match &clip {
+        Ok(clip) => clip.frames.len() * clip.joints.len(),
+        Err(Error::NotFinite { .. }) => FREE_TRANSFORMS,
+        Err(_) => 0,
+    };
+    let most = PER_BYTE * bytes.len() + PER_TRANSFORM * transforms + CONSTANT;
+    assert!(peak < most, "{name}: {peak} bytes for {}", bytes.len());
+    clip.map(|_| transforms)
+}
+
 /// Reads damaged copies of `bytes`; how many of them could be read still.
-fn survived(name: &str, bytes: &[u8], rounds: usize) -> usize {
+fn survived(name: &str, bytes: &[u8]) -> usize {
     let mut damage = Damage::new();
-    let mut survived = 0;
-    for round in 0..rounds {
+    let damaged = |round| {
         let mut damaged = bytes.to_vec();
         damage.apply(&mut damaged, bytes.len());
-        let start = Instant::now();
-        let read = || import::read(&damaged, name, None, &Options::default());
-        let (clip, peak) = HEAP.peak_of(read);
-        assert!(
-            start.elapsed() < SOON,
-            "{name}, round {round}: {:?}",
-            start.elapsed()
-        );
-        let transforms = match &clip {
-            Ok(clip) => clip.frames.len() * clip.joints.len(),
-            Err(Error::NotFinite { .. }) => FREE_TRANSFORMS,
-            Err(_) => 0,
-        };
-        survived += usize::from(clip.is_ok());
-        let most = PER_BYTE * damaged.len() + PER_TRANSFORM * transforms + CONSTANT;
-        assert!(
-            peak < most,
-            "{name}, round {round}: {peak} bytes for {}",
-            damaged.len()
-        );
+        frugal(&format!("{name}, round {round}"), &damaged).is_ok()
+    };
+    (0..ROUNDS).map(damaged).filter(|read| *read).count()
+}
+
+/// Many animations of many nodes: comparing them all would take their product.
+fn many_takes() -> Vec<u8> {
+    let channel = r#"{"sampler":0,"target":{"node":0,"path":"translation"}}"#;
+    let take = format!(r#"{{"channels":[{channel}],"samplers":[{{"input":0,"output":1}}]}}"#);
+    let nodes = vec![r#"{"name":"a node"}"#; 3000].join(",");
+    let floats: Vec<u8> = [0.0_f32, 1.0]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    // Zeros and a one as 32-bit floats, in base64.
+    assert_eq!(floats, [0, 0, 0, 0, 0, 0, 128, 63]);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],"animations":[{}],
+        "buffers":[{{"byteLength":8,"uri":"data:;base64,AAAAAAAAgD8="}}],
+        "bufferViews":[{{"buffer":0,"byteLength":8}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR"}},
+        {{"componentType":5126,"count":2,"type":"VEC3"}}]}}"#,
+        vec![take; 4000].join(",")
+    )
+    .into_bytes()
+}
+
+/// A rotation whose accessor has no bytes behind it, which means zeros, however many.
+fn many_zeros() -> Vec<u8> {
+    br#"{"asset":{"version":"2.0"},"nodes":[{}],
+    "animations":[{"channels":[{"sampler":0,"target":{"node":0,"path":"rotation"}}],"samplers":[{"input":0,"output":1}]}],
+    "accessors":[{"componentType":5126,"count":9000000,"type":"SCALAR"},{"componentType":5126,"count":9000000,"type":"VEC4"}]}"#
+        .to_vec()
+}
+
+/// Appends an FBX 7.4 record whose values are integers or texts and whose children `inside` appends.
+fn record(
+    out: &mut Vec<u8>,
+    name: &str,
+    integers: &[i64],
+    texts: &[&str],
+    inside: impl FnOnce(&mut Vec<u8>),
+) {
+    let start = out.len();
+    let mut values = Vec::new();
+    let put_text = |values: &mut Vec<u8>, text: &str| {
+        values.push(b'S');
+        values.extend(u32::to_le_bytes(text.len() as u32));
+        values.extend(text.as_bytes());
+    };
+    // Connections have their kind before the two ids.
+    let (before, after) = texts.split_at(usize::from(name == "C"));
+    before.iter().for_each(|text| put_text(&mut values, text));
+    for integer in integers {
+        values.push(b'L');
+        values.extend(integer.to_le_bytes());
     }
-    survived
+    after.iter().for_each(|text| put_text(&mut values, text));
+    out.extend([0; 4]);
+    out.extend(u32::to_le_bytes((integers.len() + texts.len()) as u32));
+    out.extend(u32::to_le_bytes(values.len() as u32));
+    out.push(name.len() as u8);
+    out.extend(name.as_bytes());
+    out.extend(values);
+    let children = out.len();
+    inside(out);
+    if out.len() > children {
+        out.extend([0; 13]);
+    }
+    let end = u32::to_le_bytes(out.len() as u32);
+    out[start..start + 4].copy_from_slice(&end);
+}
+
+/// An FBX file of `stacks` takes that share one layer, which moves `models` models.
+fn shared_layer(stacks: i64, models: i64) -> Vec<u8> {
+    let mut out = b"Kaydara FBX Binary  \0\x1a\0".to_vec();
+    out.extend(u32::to_le_bytes(7400));
+    let (model, curve_node) = (|k| 1_000_000 + k, |k| 2_000_000 + k);
+    record(&mut out, "Objects", &[], &[], |out| {
+        record(out, "AnimationLayer", &[0], &["l", ""], |_| {});
+        for k in 1..=stacks {
+            record(out, "AnimationStack", &[k], &["s", ""], |_| {});
+        }
+        for k in 0..models {
+            record(out, "Model", &[model(k)], &["m", "LimbNode"], |_| {});
+            record(
+                out,
+                "AnimationCurveNode",
+                &[curve_node(k)],
+                &["T", ""],
+                |_| {},
+            );
+        }
+    });
+    record(&mut out, "Connections", &[], &[], |out| {
+        for k in 1..=stacks {
+            record(out, "C", &[0, k], &["OO"], |_| {});
+        }
+        for k in 0..models {
+            record(out, "C", &[curve_node(k), 0], &["OO"], |_| {});
+            let property = ["OP", "Lcl Translation"];
+            record(out, "C", &[curve_node(k), model(k)], &property, |_| {});
+        }
+    });
+    out.extend([0; 13]);
+    out
 }
 
 #[test]
-fn damaged_clips_cost_no_more_than_their_size_allows() {
+fn reading_costs_no_more_than_the_size_allows() {
     let clip = |name: &str| {
         let path = format!("{}/clips/{name}", env!("CARGO_MANIFEST_DIR"));
         std::fs::read(path).expect("our own clip")
@@ -115,10 +214,18 @@ fn damaged_clips_cost_no_more_than_their_size_allows() {
         ("a.txt", deepmimic()),
     ];
     for (name, bytes) in files {
-        let survived = survived(name, &bytes, ROUNDS);
+        let survived = survived(name, &bytes);
         assert!(
             (1..ROUNDS).contains(&survived),
             "{name}: {survived} of {ROUNDS} could be read"
         );
     }
+    assert!(frugal("takes.gltf", &many_takes()).is_ok());
+    let refusal = |name: &str, bytes: &[u8]| {
+        let error = frugal(name, bytes).expect_err("refused");
+        error.to_string()
+    };
+    assert!(refusal("zeros.gltf", &many_zeros()).contains("more than"));
+    assert!(frugal("one.fbx", &shared_layer(1, 1000)).is_ok());
+    assert!(refusal("shared.fbx", &shared_layer(4000, 1000)).contains("implausibly often"));
 }

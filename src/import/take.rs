@@ -8,6 +8,9 @@ use nalgebra::Matrix4;
 /// Times within a take at which its motion is looked at when it has to be compared with others.
 const LOOKS: usize = 9;
 
+/// Most node placements that takes are compared by; a file with more is judged by what has curves alone.
+const MOST_PLACEMENTS: usize = 1 << 22;
+
 /// The take called `wanted` (its name, its name in other letter case, its name behind a `|`, or its number
 /// counted from 1), or the one with most motion, with a note when there was a choice.
 pub(crate) fn choose(
@@ -89,7 +92,7 @@ pub(crate) fn most_motion(scene: &dyn Scene) -> usize {
     best.0
 }
 
-/// Animated nodes × seconds, nought for a take in which nothing changes place.
+/// Animated nodes × seconds, nought for a take in which nothing changes place, as far as that is looked at.
 fn amount(scene: &dyn Scene, take: usize) -> f64 {
     let Some(about) = scene.takes().get(take) else {
         return 0.0;
@@ -97,6 +100,11 @@ fn amount(scene: &dyn Scene, take: usize) -> f64 {
     let span = about.end - about.start;
     if about.animated.is_empty() || span <= 0.0 {
         return 0.0;
+    }
+    let all = about.animated.len() as f64 * span;
+    let placements = scene.takes().len().saturating_mul(scene.nodes().len());
+    if placements > MOST_PLACEMENTS / LOOKS {
+        return all;
     }
     let look = |k: usize| {
         scene.world(Some((
@@ -110,11 +118,7 @@ fn amount(scene: &dyn Scene, take: usize) -> f64 {
         .map(|m| m.fixed_view::<3, 1>(0, 3).norm())
         .fold(0.0, f64::max);
     let moves = (1..LOOKS).any(|k| differ(&first, &look(k), 1e-6 * size.max(1e-9)));
-    if moves {
-        about.animated.len() as f64 * span
-    } else {
-        0.0
-    }
+    if moves { all } else { 0.0 }
 }
 
 /// Whether some node is elsewhere, or turned.

@@ -83,6 +83,11 @@ impl Curve {
         }))
     }
 
+    /// Number of keys.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
     /// Ticks of the first and the last key.
     pub fn ends(&self) -> (f64, f64) {
         let tick = |key: Option<&Key>| key.map_or(0.0, |key| key.tick);

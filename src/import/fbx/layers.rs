@@ -16,16 +16,42 @@ pub(super) struct Curves {
     /// Ticks per second.
     ticks: f64,
     budget: usize,
+    /// Connections that takes may still be followed along.
+    steps: usize,
+    /// Keys that channels may still have together.
+    keys: usize,
 }
 
+/// Most keys that all channels of a file may have together, counting a shared curve each time.
+const MOST_KEYS: usize = 64 << 20;
+/// How often a connection is followed on average, at most. In real files no layer or curve has several users.
+const STEPS_PER_LINK: usize = 16;
+/// More layers than this would have to be weighed at every frame.
+const MOST_LAYERS: usize = 256;
+
 impl Curves {
-    pub fn new(ticks: f64, budget: usize) -> Self {
+    /// `budget` is how many bytes may be decoded, `links` how many connections the file has.
+    pub fn new(ticks: f64, budget: usize, links: usize) -> Self {
         Self {
             list: Vec::new(),
             of_object: BTreeMap::new(),
             ticks,
             budget,
+            steps: links.saturating_mul(STEPS_PER_LINK),
+            keys: MOST_KEYS,
         }
+    }
+
+    fn walk(&mut self, steps: usize) -> Result<(), FbxError> {
+        spend(&mut self.steps, steps)
+    }
+
+    /// Loads a curve that one more channel uses.
+    fn share(&mut self, object: &Object, index: usize) -> Result<Option<usize>, FbxError> {
+        let place = self.load(object, index)?;
+        let keys = place.and_then(|place| self.list.get(place));
+        spend(&mut self.keys, keys.map_or(0, Curve::len))?;
+        Ok(place)
     }
 
     fn load(&mut self, object: &Object, index: usize) -> Result<Option<usize>, FbxError> {
@@ -45,6 +71,19 @@ impl Curves {
         });
         self.of_object.insert(index, place);
         Ok(place)
+    }
+}
+
+fn spend(left: &mut usize, cost: usize) -> Result<(), FbxError> {
+    let rest = left.checked_sub(cost);
+    *left = rest.ok_or_else(|| implausible("layers and curves are shared implausibly often"))?;
+    Ok(())
+}
+
+fn implausible(reason: &str) -> FbxError {
+    FbxError::Broken {
+        place: "the takes".into(),
+        reason: reason.into(),
     }
 }
 
@@ -91,8 +130,8 @@ impl Channel {
 #[derive(Debug)]
 pub(super) struct Animation {
     layers: Vec<Layer>,
-    /// Channels of every node, lower layers first.
-    channels: Vec<Vec<Channel>>,
+    /// Channels of the nodes that have any, lower layers first.
+    channels: BTreeMap<usize, Vec<Channel>>,
 }
 
 impl Animation {
@@ -106,11 +145,14 @@ impl Animation {
     ) -> Result<Self, FbxError> {
         let mut animation = Self {
             layers: Vec::new(),
-            channels: Vec::new(),
+            channels: BTreeMap::new(),
         };
-        animation.channels.resize_with(tree.nodes.len(), Vec::new);
         for link in graph.children(stack, "AnimationLayer") {
             let record = graph.objects[link.child].record;
+            curves.walk(1 + graph.degree(link.child))?;
+            if animation.layers.len() == MOST_LAYERS {
+                return Err(implausible("a take has too many layers"));
+            }
             animation.layers.push(layer(&templates.properties(record)));
             animation.read_channels(graph, link.child, templates, tree, curves)?;
         }
@@ -127,6 +169,7 @@ impl Animation {
     ) -> Result<(), FbxError> {
         for link in graph.children(layer, "AnimationCurveNode") {
             let curve_node = link.child;
+            curves.walk(1 + 2 * graph.degree(curve_node))?;
             let properties = templates.properties(graph.objects[curve_node].record);
             for target in graph.parents(curve_node, "Model") {
                 let property = target.property.and_then(Property::named);
@@ -165,7 +208,7 @@ impl Animation {
         rig: &Rig,
     ) {
         let layer = self.layers.len().saturating_sub(1);
-        let channels = &mut self.channels[node];
+        let channels = self.channels.entry(node).or_default();
         let mut own = channels
             .iter()
             .rev()
@@ -185,8 +228,13 @@ impl Animation {
         });
     }
 
+    /// Nodes that have channels.
+    pub fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.channels.keys().copied()
+    }
+
     pub fn channels(&self, node: usize) -> &[Channel] {
-        &self.channels[node]
+        self.channels.get(&node).map_or(&[], Vec::as_slice)
     }
 
     /// Weights of all layers at `tick`.
@@ -208,7 +256,7 @@ impl Animation {
         tick: f64,
     ) -> Pose {
         let mut pose = rig.rest;
-        for channel in &self.channels[node] {
+        for channel in self.channels(node) {
             let over = channel.value(curves, tick);
             let slot = pose.at_mut(channel.property);
             *slot = match self.layers.get(channel.layer) {
@@ -303,7 +351,7 @@ fn axes(
             Some(_) => 0,
             None => continue,
         };
-        axes[axis] = curves.load(&graph.objects[link.child], link.child)?;
+        axes[axis] = curves.share(&graph.objects[link.child], link.child)?;
     }
     Ok(axes)
 }

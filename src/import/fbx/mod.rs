@@ -75,20 +75,19 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     let templates = Templates::read(&document);
     let graph = Graph::read(&document);
     let tree = Tree::read(&graph, &templates);
-    let mut curves = Curves::new(settings.ticks, document.budget);
+    let mut curves = Curves::new(settings.ticks, document.budget, graph.links());
     let mut problems = settings.problems.clone();
     problems.extend(graph_problems(&graph, &tree));
     let (mut takes, mut animations) = (Vec::new(), Vec::new());
     for stack in graph.of_class("AnimationStack") {
         let animation = Animation::read(&graph, stack, &templates, &tree, &mut curves)?;
         let object = &graph.objects[stack];
-        let (count, ticks) = (tree.nodes.len(), settings.ticks);
+        let ticks = settings.ticks;
         let properties = templates.properties(object.record);
         let take = takes::take(
             &object.name,
             &properties,
             &animation,
-            count,
             &curves.list,
             ticks,
             settings.fps,
@@ -96,7 +95,6 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
         problems.extend(takes::problems(
             &take,
             &animation,
-            count,
             &curves.list,
             ticks,
         ));

@@ -112,6 +112,16 @@ impl<'d, 'a> Graph<'d, 'a> {
             .filter(move |link| self.objects[link.parent].is(class))
     }
 
+    /// Number of connections of `object`.
+    pub fn degree(&self, object: usize) -> usize {
+        self.children[object].len() + self.parents[object].len()
+    }
+
+    /// Number of all connections.
+    pub fn links(&self) -> usize {
+        self.children.iter().map(Vec::len).sum()
+    }
+
     /// Indices of all objects of class `class`.
     pub fn of_class<'s>(&'s self, class: &'s str) -> impl Iterator<Item = usize> + 's {
         (0..self.objects.len()).filter(move |&object| self.objects[object].is(class))

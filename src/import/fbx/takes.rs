@@ -16,20 +16,18 @@ pub(super) fn take(
     name: &str,
     properties: &Properties,
     animation: &Animation,
-    nodes: usize,
     curves: &[Curve],
     ticks: f64,
     fps: Option<f64>,
 ) -> Take {
-    let keyed = key_range(animation, nodes, curves);
+    let keyed = key_range(animation, curves);
     let (start, end) = span(properties, keyed, ticks);
     let moves = |node: &usize| {
         let mut own = curves_of(animation, *node, curves);
         own.any(|curve| curve.varies((start * ticks).round(), (end * ticks).round()))
     };
-    let animated = (0..nodes).filter(moves).collect();
-    let fps =
-        fps.unwrap_or_else(|| spacing_fps(animation, nodes, curves, ticks).unwrap_or(FALLBACK_FPS));
+    let animated = animation.nodes().filter(moves).collect();
+    let fps = fps.unwrap_or_else(|| spacing_fps(animation, curves, ticks).unwrap_or(FALLBACK_FPS));
     Take {
         name: name.into(),
         start,
@@ -55,15 +53,16 @@ fn curves_of<'a>(
 
 fn all_curves<'a>(
     animation: &'a Animation,
-    nodes: usize,
     curves: &'a [Curve],
 ) -> impl Iterator<Item = &'a Curve> {
-    (0..nodes).flat_map(move |node| curves_of(animation, node, curves))
+    animation
+        .nodes()
+        .flat_map(move |node| curves_of(animation, node, curves))
 }
 
 /// First and last tick of the curves that move nodes.
-fn key_range(animation: &Animation, nodes: usize, curves: &[Curve]) -> Option<(f64, f64)> {
-    let ends = all_curves(animation, nodes, curves).map(Curve::ends);
+fn key_range(animation: &Animation, curves: &[Curve]) -> Option<(f64, f64)> {
+    let ends = all_curves(animation, curves).map(Curve::ends);
     ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
@@ -86,9 +85,9 @@ fn span(properties: &Properties, keyed: Option<(f64, f64)>, ticks: f64) -> (f64,
 }
 
 /// Frame rate of the keys' most common spacing; of equally common ones, the fastest.
-fn spacing_fps(animation: &Animation, nodes: usize, curves: &[Curve], ticks: f64) -> Option<f64> {
+fn spacing_fps(animation: &Animation, curves: &[Curve], ticks: f64) -> Option<f64> {
     let mut counts = BTreeMap::<u64, usize>::new();
-    for curve in all_curves(animation, nodes, curves) {
+    for curve in all_curves(animation, curves) {
         for spacing in curve.spacings().filter(|&spacing| spacing >= 1.0) {
             *counts.entry(spacing as u64).or_default() += 1;
         }
@@ -111,7 +110,6 @@ fn spacing_fps(animation: &Animation, nodes: usize, curves: &[Curve], ticks: f64
 pub(super) fn problems(
     take: &Take,
     animation: &Animation,
-    nodes: usize,
     curves: &[Curve],
     ticks: f64,
 ) -> Vec<Problem> {
@@ -131,7 +129,7 @@ pub(super) fn problems(
             "cut-take",
             format!("take `{}` is cut to its first six hours", take.name),
         );
-    } else if let Some((first, last)) = key_range(animation, nodes, curves) {
+    } else if let Some((first, last)) = key_range(animation, curves) {
         let (first, last, frame) = (first / ticks, last / ticks, 1.0 / take.fps);
         if first < take.start - frame || last > take.end + frame {
             note(

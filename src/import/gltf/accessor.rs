@@ -9,15 +9,22 @@ use gltf::json::{Index, buffer::View};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Most numbers that all accessors of a file may hold together; a few bytes of JSON can ask for any amount.
-const MOST_NUMBERS: usize = 64 << 20;
+/// Numbers that all accessors of a file may hold together, and how many more per byte that was read: no real file
+/// reads its bytes many times over, but a few bytes of JSON can ask for any amount.
+const FREE_NUMBERS: usize = 1 << 16;
+const NUMBERS_PER_BYTE: usize = 4;
+/// Most numbers that curves may be given together, counting a shared accessor each time.
+const MOST_GIVEN: usize = 1 << 28;
 
 /// Reads accessors, each once.
 pub(super) struct Accessors<'a> {
     document: &'a Document,
     buffers: Buffers<'a>,
     done: BTreeMap<usize, Rc<[f64]>>,
+    /// Numbers held.
     numbers: usize,
+    /// Numbers given to curves.
+    given: usize,
 }
 
 /// Where the elements of an accessor lie in a buffer view.
@@ -38,6 +45,7 @@ impl<'a> Accessors<'a> {
             buffers,
             done: BTreeMap::new(),
             numbers: 0,
+            given: 0,
         }
     }
 
@@ -67,24 +75,37 @@ impl<'a> Accessors<'a> {
             let wanted = format!("{wanted:?}").to_uppercase();
             return Err(broken(format!("it is {kind} where {wanted} is wanted")));
         }
-        if let Some(done) = self.done.get(&accessor) {
-            return Ok(done.clone());
-        }
-        let numbers = self.numbers(about, wanted.multiplicity());
-        let numbers: Rc<[f64]> = numbers.map_err(broken)?.into();
+        let numbers = match self.done.get(&accessor) {
+            Some(done) => done.clone(),
+            None => self
+                .numbers(about, wanted.multiplicity())
+                .map_err(broken)?
+                .into(),
+        };
         self.done.insert(accessor, numbers.clone());
+        self.given = self.given.saturating_add(numbers.len());
+        if self.given > MOST_GIVEN {
+            return Err(broken("it is shared implausibly often".to_owned()));
+        }
         Ok(numbers)
+    }
+
+    /// Counts numbers that are about to be held.
+    fn hold(&mut self, numbers: usize) -> Result<(), String> {
+        self.numbers = self.numbers.saturating_add(numbers);
+        let most = self.buffers.bytes().saturating_mul(NUMBERS_PER_BYTE);
+        let most = most.saturating_add(FREE_NUMBERS);
+        if self.numbers > most {
+            return Err(format!(
+                "with it the file asks for more than {most} numbers"
+            ));
+        }
+        Ok(())
     }
 
     fn numbers(&mut self, about: &Accessor, width: usize) -> Result<Vec<f64>, String> {
         let count = size(about.count);
         let length = count.checked_mul(width).ok_or("too many elements")?;
-        self.numbers = self.numbers.saturating_add(length);
-        if self.numbers > MOST_NUMBERS {
-            return Err(format!(
-                "with it the file asks for more than {MOST_NUMBERS} numbers"
-            ));
-        }
         let Checked::Valid(component) = about.component_type else {
             return Err("unknown component type".to_owned());
         };
@@ -100,7 +121,10 @@ impl<'a> Accessors<'a> {
             Some(view) => {
                 self.elements(&layout(view, about.byte_offset.unwrap_or_default(), count))?
             }
-            None => vec![0.0; length],
+            None => {
+                self.hold(length)?;
+                vec![0.0; length]
+            }
         };
         if let Some(sparse) = &about.sparse {
             let (some, indices, values) = (size(sparse.count), &sparse.indices, &sparse.values);
@@ -131,8 +155,12 @@ impl<'a> Accessors<'a> {
                 "it is packed with {name}; unpack it, with gltfpack or gltf-transform"
             ));
         }
-        let bytes = self.buffers.get(view.buffer.value());
-        let bytes = bytes.map_err(|e| e.to_string())?;
+        let length = layout.count.checked_mul(layout.width);
+        let length = length.ok_or("too many elements")?;
+        let buffer = view.buffer.value();
+        self.buffers.get(buffer).map_err(|e| e.to_string())?;
+        self.hold(length)?;
+        let bytes = self.buffers.get(buffer).map_err(|e| e.to_string())?;
         let start = size(view.byte_offset.unwrap_or_default());
         let end = start.checked_add(size(view.byte_length));
         let bytes = end
@@ -155,7 +183,7 @@ impl<'a> Accessors<'a> {
                 layout.count, layout.view
             ));
         }
-        let mut numbers = Vec::with_capacity(layout.count * layout.width);
+        let mut numbers = Vec::with_capacity(length);
         for element in 0..layout.count {
             let at = layout.offset + element * stride;
             let element = bytes.get(at..at + size).unwrap_or_default();

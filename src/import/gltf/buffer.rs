@@ -40,6 +40,11 @@ impl<'a> Buffers<'a> {
         Ok(self.fetched.get(&buffer).map_or(&[], |bytes| bytes))
     }
 
+    /// How many bytes have been fetched.
+    pub fn bytes(&self) -> usize {
+        self.fetched.values().map(|bytes| bytes.len()).sum()
+    }
+
     fn fetch(&mut self, buffer: usize) -> Result<Cow<'a, [u8]>, String> {
         let about = self.document.buffers.get(buffer);
         let about = about.ok_or("the file has no such buffer; export it again")?;
