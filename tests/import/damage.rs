@@ -5,7 +5,7 @@ pub(crate) struct Damage(u64);
 
 impl Damage {
     pub(crate) fn new() -> Self {
-        Self(0x6d69_6d69_63)
+        Self(0x6d_696d_6963)
     }
 
     fn below(&mut self, limit: usize) -> usize {

@@ -92,12 +92,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
             ticks,
             settings.fps,
         );
-        problems.extend(takes::problems(
-            &take,
-            &animation,
-            &curves.list,
-            ticks,
-        ));
+        problems.extend(takes::problems(&take, &animation, &curves.list, ticks));
         takes.push(take);
         animations.push(animation);
     }
