@@ -56,7 +56,7 @@ const PER_TRANSFORM: usize = 160;
 /// Transforms that any file may be sampled to.
 const FREE_TRANSFORMS: usize = 1 << 20;
 const ROUNDS: usize = 2000;
-const SOON: Duration = Duration::from_secs(20);
+const SOON: Duration = Duration::from_secs(10);
 
 fn deepmimic() -> Vec<u8> {
     let pose = ["1.0", "0.0", "0.0", "0.0"];
@@ -103,7 +103,7 @@ fn survived(name: &str, bytes: &[u8]) -> usize {
 fn many_takes() -> Vec<u8> {
     let channel = r#"{"sampler":0,"target":{"node":0,"path":"translation"}}"#;
     let take = format!(r#"{{"channels":[{channel}],"samplers":[{{"input":0,"output":1}}]}}"#);
-    let nodes = vec![r#"{"name":"a node"}"#; 3000].join(",");
+    let nodes = vec![r#"{"name":"a node"}"#; 10_000].join(",");
     let floats: Vec<u8> = [0.0_f32, 1.0]
         .iter()
         .flat_map(|x| x.to_le_bytes())
@@ -116,7 +116,7 @@ fn many_takes() -> Vec<u8> {
         "bufferViews":[{{"buffer":0,"byteLength":8}}],
         "accessors":[{{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR"}},
         {{"componentType":5126,"count":2,"type":"VEC3"}}]}}"#,
-        vec![take; 4000].join(",")
+        vec![take; 10_000].join(",")
     )
     .into_bytes()
 }
