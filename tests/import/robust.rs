@@ -33,7 +33,11 @@ fn survives(name: &str, bytes: &[u8], rounds: usize) {
 
 #[test]
 fn damaged_synthetic_files() {
-    survives("a.gltf", super::gltf_made::synthetic_file().as_bytes(), 4000);
+    survives(
+        "a.gltf",
+        super::gltf_made::synthetic_file().as_bytes(),
+        4000,
+    );
 }
 
 #[test]
