@@ -11,6 +11,9 @@ pub(crate) struct Frame {
     pub unit_m: f64,
 }
 
+/// Places beyond this are damage, not motion, and single precision can't hold them: metres.
+const FARTHEST_M: f64 = 1e12;
+
 impl Frame {
     /// The rigid transform at the place of `world`, with the rotation nearest to its own; a matrix that has none
     /// (scaled to nothing) takes `otherwise`.
@@ -23,7 +26,7 @@ impl Frame {
         otherwise: &UnitQuaternion<f64>,
     ) -> Option<Isometry3<f64>> {
         let place = self.axes * world.fixed_view::<3, 1>(0, 3).into_owned() * self.unit_m;
-        if !place.iter().all(|x| x.is_finite()) {
+        if !place.iter().all(|x| x.abs() < FARTHEST_M) {
             return None;
         }
         let rotation = match rotation_of(&world.fixed_view::<3, 3>(0, 0).into_owned()) {

@@ -225,7 +225,8 @@ fn scale_of_any_kind_leaves_joints_in_their_places() {
         let clip = read(&text).expect("it imports");
         for f in 0..clip.frames.len() {
             let knee = clip.world(f)[1].translation.vector;
-            assert!((knee - place).norm() < 1e-9, "{scale:?} frame {f}: {knee}");
+            // Clips hold single precision.
+            assert!((knee - place).norm() < 1e-6, "{scale:?} frame {f}: {knee}");
         }
     }
 }
