@@ -66,6 +66,10 @@ pub enum TrainError {
     Learn(#[from] LearnError),
     #[error("{0} must be at least 1")]
     Zero(&'static str),
+    #[error(
+        "motions `{first}` and `{other}` put different bodies on the ground, and one policy sees the contacts of one set; train them apart"
+    )]
+    OtherContacts { first: String, other: String },
     #[error("there is no motion to learn")]
     NoMotion,
 }
@@ -147,11 +151,7 @@ impl Trainer {
             })
             .collect();
         let references = references?;
-        let contacts = references
-            .first()
-            .ok_or(TrainError::NoMotion)?
-            .contact_links
-            .len();
+        let contacts = contacts(&references)?;
         let spec = PolicySpec {
             observation: observation_size(&stage, contacts),
             action: stage.character.dof,
@@ -350,5 +350,17 @@ impl Trainer {
             action_std,
             reward_terms: reward_terms.collect(),
         }
+    }
+}
+
+/// Contact links of the motions, which must be the same for all.
+fn contacts(references: &[Arc<Reference>]) -> Result<usize, TrainError> {
+    let first = references.first().ok_or(TrainError::NoMotion)?;
+    match references.iter().find(|r| r.contact_links != first.contact_links) {
+        Some(other) => Err(TrainError::OtherContacts {
+            first: first.name.clone(),
+            other: other.name.clone(),
+        }),
+        None => Ok(first.contact_links.len()),
     }
 }

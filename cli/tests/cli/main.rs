@@ -2,6 +2,7 @@
 
 mod exit_codes;
 mod output;
+mod readme;
 mod stages;
 mod training;
 mod workbench;
