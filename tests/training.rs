@@ -125,3 +125,27 @@ fn a_run_is_never_overwritten() {
             .contains("already holds a run")
     );
 }
+
+#[test]
+fn what_cannot_be_trained_is_refused_before_a_folder_appears() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("run");
+    type Break = fn(&mut Plan);
+    let broken: [(Break, &str); 6] = [
+        (|plan| plan.task.physics.control_hz = 0.0, "control_hz"),
+        (|plan| plan.task.physics.substeps = 0, "substeps"),
+        (|plan| plan.task.episode_s = f64::NAN, "episode_s"),
+        (|plan| plan.task.rewards.pose = -1.0, "reward weight"),
+        (|plan| plan.final_std = 0.0, "final_std"),
+        (|plan| plan.environments = 0, "environments"),
+    ];
+    for (spoil, name) in broken {
+        let mut plan = tiny();
+        spoil(&mut plan);
+        let error = Run::create(&path, plan, skeleton(), vec![kick()])
+            .err()
+            .expect("refused");
+        assert!(error.to_string().contains(name), "{error}");
+        assert!(!path.exists(), "{name}: a folder was left behind");
+    }
+}

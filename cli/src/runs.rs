@@ -32,7 +32,7 @@ pub fn evaluate(
     options: &Options,
     printer: &Printer,
 ) -> Outcome<Vec<(String, Evaluation)>> {
-    let performer = run.performer(options.seconds).map_err(failure)?;
+    let performer = run.performer().map_err(failure)?;
     let mut results = Vec::new();
     for (which, motion) in run.motions().iter().enumerate() {
         printer.note(format!(
@@ -62,7 +62,7 @@ pub fn evaluation_json(results: &[(String, Evaluation)]) -> Value {
 
 /// The agent's performance of reference number `which` from its first frame.
 pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
-    let performer: Performer = run.performer(seconds).map_err(failure)?;
+    let performer: Performer = run.performer().map_err(failure)?;
     let motion = run.motions().get(which).ok_or_else(|| {
         let count = run.motions().len();
         Failure::user(format!(

@@ -1,5 +1,6 @@
 //! One deterministic episode, kept frame by frame for metrics and replay.
 
+use crate::clip::LoopMode;
 use crate::learn::{LearnError, Memory, Performer};
 use crate::sim::LinkState;
 use crate::task::{Dynamics, Failure, Outcome, Sample, Setting, Stage, Terminations, Terms};
@@ -32,6 +33,10 @@ pub struct Trace {
     pub frames: Vec<Frame>,
     /// Steps of an episode without failure.
     pub possible: usize,
+    /// Frames before a failure; with one, the last frame shows it.
+    pub survived: usize,
+    /// Largest angular momentum of the reference, kg·m²/s.
+    pub largest_momentum: f32,
     pub failure: Option<Failure>,
     /// Links that the motion puts on the ground, in the order of [`Frame::contacts`].
     pub contact_links: Vec<usize>,
@@ -43,7 +48,7 @@ pub struct Trace {
 /// was trained under.
 ///
 /// # Errors
-/// Observations that stopped being finite.
+/// A task of another shape than the policy's.
 pub fn play(
     performer: &Performer,
     which: usize,
@@ -55,12 +60,16 @@ pub fn play(
         fall: true,
         reward: None,
     };
+    let reference = &performer.references()[which];
+    let episode_s = match reference.loop_mode() {
+        LoopMode::Wrap => seconds,
+        LoopMode::Clamp => reference.duration() + 1.0,
+    };
     let setting = Setting {
         terminations: rules,
-        episode_s: seconds,
+        episode_s,
         ..*performer.setting()
     };
-    let reference = &performer.references()[which];
     let mut env = performer.environment(which, &setting);
     env.reset(start * env.last_start());
     let mut trace = Trace {
@@ -68,6 +77,8 @@ pub fn play(
         control_hz: setting.physics.control_hz,
         frames: Vec::new(),
         possible: env.possible_steps() as usize,
+        survived: 0,
+        largest_momentum: reference.largest_momentum(),
         failure: None,
         contact_links: reference.contact_links.clone(),
     };
@@ -77,14 +88,13 @@ pub fn play(
         let step = env.step(action);
         let mut sample = reference.blank();
         reference.sample(env.time(), &mut sample);
-        if let Outcome::Failed(failure) = step.outcome {
-            trace.failure = Some(failure);
-            return Ok(trace);
-        }
-        if mean_distance(performer.stage(), env.states(), &sample.links) > LOST_M {
-            trace.failure = Some(Failure::Distance);
-            return Ok(trace);
-        }
+        trace.failure = match step.outcome {
+            Outcome::Failed(failure) => Some(failure),
+            _ if mean_distance(performer.stage(), env.states(), &sample.links) > LOST_M => {
+                Some(Failure::Distance)
+            }
+            _ => None,
+        };
         trace.frames.push(Frame {
             time: env.time(),
             agent: env.states().to_vec(),
@@ -98,6 +108,10 @@ pub fn play(
             terms: step.terms,
             reward: step.reward,
         });
+        if trace.failure.is_some() {
+            return Ok(trace);
+        }
+        trace.survived += 1;
         if step.outcome != Outcome::Running {
             return Ok(trace);
         }

@@ -7,7 +7,7 @@ use crate::task::Stage;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// What an evaluation found. Means are over all frames of all episodes up to their failure.
+/// What an evaluation found. Means are over all frames of all episodes, the one that shows a failure included.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     pub episodes: usize,
@@ -15,15 +15,15 @@ pub struct Evaluation {
     pub survival: f64,
     /// The same for the episode from the first frame alone.
     pub survival_from_start: f64,
-    /// Share of episodes whose mean body error never exceeds 0.5 m.
+    /// Share of episodes without a fall whose mean body error never exceeds 0.5 m.
     pub success_mean_0_5: f64,
-    /// Share of episodes whose largest body error never exceeds 0.25 m.
+    /// Share of those whose largest body error never exceeds 0.25 m.
     pub success_max_0_25: f64,
     /// Mean distance of bodies from their reference, mm.
     pub mpjpe_global_mm: f64,
     /// The same with each skeleton's root position subtracted, and no rotation alignment, mm.
     pub mpjpe_local_mm: f64,
-    /// Mean difference of link velocities, m/s.
+    /// Mean difference of the velocities of the links' origins, m/s.
     pub velocity_error_m_s: f64,
     /// Mean distance of the centres of mass, m.
     pub com_error_m: f64,
@@ -35,22 +35,28 @@ pub struct Evaluation {
     pub foot_skate_m_s: f64,
     /// Mean over episodes of summed reward ÷ the steps of an episode without failure.
     pub normalized_return: f64,
-    /// How far the root turned about the axis about which the reference turns most, radians, mean over episodes.
+    /// How far the root turned about the axis about which the reference turns most, radians, in the episode from the
+    /// first frame.
     pub root_rotation_turned_rad: f64,
+    /// How far the reference turned about it.
+    pub root_rotation_reference_rad: f64,
 }
 
 /// Measures episodes.
 pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
     let per_episode = |value: &dyn Fn(&Trace) -> f64| mean(traces.iter().map(value));
+    let from_start =
+        |value: &dyn Fn(&Trace) -> f64| mean(traces.iter().filter(|t| t.start == 0.0).map(value));
     let frames = || traces.iter().flat_map(|t| &t.frames);
     let per_frame = |value: &dyn Fn(&Frame) -> f64| mean(frames().map(value));
-    let largest_momentum = frames()
-        .map(|f| f.reference.dynamics.angular_momentum.norm())
+    let largest_momentum = traces
+        .iter()
+        .map(|t| t.largest_momentum)
         .fold(0.0, f32::max);
     Evaluation {
         episodes: traces.len(),
         survival: per_episode(&survival),
-        survival_from_start: mean(traces.iter().filter(|t| t.start == 0.0).map(survival)),
+        survival_from_start: from_start(&survival),
         success_mean_0_5: per_episode(&|t| f64::from(u8::from(t.failure.is_none()))),
         success_max_0_25: per_episode(&|t| {
             f64::from(u8::from(
@@ -69,7 +75,8 @@ pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
         normalized_return: per_episode(&|t| {
             t.frames.iter().map(|f| f64::from(f.reward)).sum::<f64>() / t.possible.max(1) as f64
         }),
-        root_rotation_turned_rad: per_episode(&turned),
+        root_rotation_turned_rad: from_start(&|t| turned(t, |f| &f.agent[0])),
+        root_rotation_reference_rad: from_start(&|t| turned(t, |f| &f.reference.links[0])),
     }
 }
 
@@ -81,7 +88,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn survival(trace: &Trace) -> f64 {
-    (trace.frames.len() as f64 / trace.possible.max(1) as f64).min(1.0)
+    (trace.survived as f64 / trace.possible.max(1) as f64).min(1.0)
 }
 
 fn errors<'a>(stage: &'a Stage, frame: &'a Frame, local: bool) -> impl Iterator<Item = f64> + 'a {
@@ -180,8 +187,8 @@ fn lowest_point(shape: &Shape, state: &LinkState) -> Vector3<f32> {
     }
 }
 
-/// Angle turned about the axis of the reference's own net turning, each in its root's frame.
-fn turned(trace: &Trace) -> f64 {
+/// Angle that a root turned about the axis of the reference's own net turning, each in its own frame.
+fn turned(trace: &Trace, root: impl Fn(&Frame) -> &LinkState) -> f64 {
     let spin = |state: &LinkState| {
         state
             .pose
@@ -198,7 +205,7 @@ fn turned(trace: &Trace) -> f64 {
     trace
         .frames
         .iter()
-        .map(|f| spin(&f.agent[0]).dot(&axis))
+        .map(|f| spin(root(f)).dot(&axis))
         .sum::<f64>()
         / trace.control_hz
 }

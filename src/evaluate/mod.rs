@@ -32,7 +32,7 @@ impl Default for Options {
 /// Episodes are played in parallel and gathered in order.
 ///
 /// # Errors
-/// An agent whose observations stopped being finite.
+/// A task of another shape than the policy's.
 pub fn evaluate(
     performer: &Performer,
     which: usize,

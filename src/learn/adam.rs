@@ -9,7 +9,7 @@ pub(crate) const PIECE: usize = 1 << 14;
 
 /// Kingma & Ba 2015, "Adam: a method for stochastic optimization", with their defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(deny_unknown_fields, default)]
 pub struct AdamConfig {
     pub beta1: f64,
     pub beta2: f64,

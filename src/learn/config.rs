@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// How to learn. Left-out fields take the defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Discount per control step.
     pub gamma: f64,
@@ -64,9 +64,9 @@ impl Default for Config {
             learning_rate: 3e-4,
             min_learning_rate: 1e-5,
             max_learning_rate: 1e-2,
-            target_kl: Some(0.02),
+            target_kl: Some(0.05),
             stop_kl_factor: 3.0,
-            initial_std: 0.15,
+            initial_std: 0.5,
             learn_std: false,
             normalize_returns: true,
             adam: AdamConfig::default(),

@@ -96,6 +96,12 @@ impl<T: Scalar> Learner<T> {
         &self.state
     }
 
+    /// Standard deviation of the action noise, the geometric mean over actions.
+    pub fn mean_std(&self) -> f64 {
+        let log_std = &self.state.parameters[self.policy.log_std_range()];
+        (log_std.iter().map(|s| s.to_f64()).sum::<f64>() / log_std.len() as f64).exp()
+    }
+
     /// Sets the standard deviation of the action noise, for noise that follows a schedule.
     pub fn set_std(&mut self, std: f64) {
         let range = self.policy.log_std_range();

@@ -8,6 +8,7 @@ use crate::motion::{Motion, MotionError};
 use crate::skeleton::{Skeleton, SkeletonError};
 use crate::task::{Reference, Stage, TaskError};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -82,6 +83,8 @@ impl Run {
         if dir.join(CONFIG).exists() {
             return Err(RunError::Exists(dir.to_owned()));
         }
+        // What can't be trained leaves no folder behind.
+        Trainer::new(plan.clone(), Stage::new(skeleton.clone())?, &motions)?;
         fs::create_dir_all(dir).map_err(io("create", dir))?;
         write(&dir.join("skeleton.xml"), skeleton.mjcf.as_bytes())?;
         write(&dir.join("skeleton.json"), skeleton.slots_json().as_bytes())?;
@@ -110,14 +113,16 @@ impl Run {
         if !path.exists() {
             return Err(RunError::NoRun(dir.to_owned()));
         }
-        let config: Config = serde_json::from_str(&read(&path)?).map_err(|e| corrupt(&path, e))?;
-        if (config.format.as_str(), config.version) != ("run", 1) {
+        let config: Value = serde_json::from_str(&read(&path)?).map_err(|e| corrupt(&path, e))?;
+        // A newer version may have other fields, so this comes first.
+        if (&config["format"], &config["version"]) != (&json!("run"), &json!(1)) {
             let reason = format!(
                 "format {} {} is not known to this version",
-                config.format, config.version
+                config["format"], config["version"]
             );
             return Err(RunError::Config { path, reason });
         }
+        let config: Config = serde_json::from_value(config).map_err(|e| corrupt(&path, e))?;
         let mjcf = read(&dir.join("skeleton.xml"))?;
         let slots = read(&dir.join("skeleton.json"))?;
         let mut motions = Vec::new();
@@ -200,7 +205,7 @@ impl Run {
             parameters: learner.parameters.clone(),
             normalizer: normalizer.clone(),
             tensors: Default::default(),
-            details: serde_json::json!({ "task": self.plan.task, "skeleton": self.skeleton.name }),
+            details: json!({ "task": self.plan.task, "skeleton": self.skeleton.name }),
         };
         let checkpoint = Checkpoint {
             iteration,
@@ -209,7 +214,7 @@ impl Run {
             normalizer,
             rngs: Default::default(),
             tensors: Default::default(),
-            details: serde_json::Value::Null,
+            details: Value::Null,
         };
         checkpoint.save(&self.dir.join(CHECKPOINT))?;
         Ok(policy.save(&self.dir.join(POLICY))?)
@@ -219,7 +224,7 @@ impl Run {
     ///
     /// # Errors
     /// A file that can't be written.
-    pub fn log(&self, line: &serde_json::Value) -> Result<(), RunError> {
+    pub fn log(&self, line: &Value) -> Result<(), RunError> {
         let path = self.dir.join(METRICS);
         let mut file = fs::OpenOptions::new()
             .create(true)
@@ -237,11 +242,11 @@ impl Run {
         write(&self.dir.join(name), text.as_bytes())
     }
 
-    /// The policy, ready to act for up to `horizon_s` seconds.
+    /// The policy, ready to act.
     ///
     /// # Errors
     /// A run without a policy, or a broken one.
-    pub fn performer(&self, horizon_s: f64) -> Result<Performer, RunError> {
+    pub fn performer(&self) -> Result<Performer, RunError> {
         let path = self.dir.join(POLICY);
         if !path.exists() {
             return Err(RunError::NoPolicy(self.dir.clone()));
@@ -250,11 +255,7 @@ impl Run {
         let stage = Arc::new(Stage::new(self.skeleton.clone())?);
         let mut references = Vec::new();
         for motion in &self.motions {
-            references.push(Arc::new(Reference::new(
-                motion,
-                &stage,
-                motion.duration() + horizon_s + 1.0,
-            )?));
+            references.push(Arc::new(Reference::new(motion, &stage)?));
         }
         Ok(Performer::new(
             file.spec,

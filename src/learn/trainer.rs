@@ -1,6 +1,6 @@
 //! A training run: rollouts, advantages, updates, in iterations that read top to bottom.
 
-use super::rollout::{Actor, Buffer, Group, stream};
+use super::rollout::{Actor, Buffer, Episode, Group, stream};
 use super::{
     Batch, Config, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT, PolicySpec,
     Trajectories, UpdateStats, advantages,
@@ -41,11 +41,7 @@ impl Default for Plan {
         Self {
             seed: 1,
             task: Setting::default(),
-            ppo: Config {
-                initial_std: 0.5,
-                target_kl: Some(0.05),
-                ..Config::default()
-            },
+            ppo: Config::default(),
             hidden: vec![256, 128],
             environments: 64,
             group: 16,
@@ -54,6 +50,30 @@ impl Default for Plan {
             samples: 4_000_000,
             final_std: 0.4,
         }
+    }
+}
+
+impl Plan {
+    fn check(&self, motions: usize) -> Result<(), TrainError> {
+        for (name, value) in [
+            ("environments", self.environments),
+            ("group", self.group),
+            ("horizon", self.horizon),
+        ] {
+            if value == 0 {
+                return Err(TrainError::Zero(name));
+            }
+        }
+        if motions > self.environments {
+            return Err(TrainError::TooFewEnvironments {
+                motions,
+                environments: self.environments,
+            });
+        }
+        if !(self.final_std > 0.0 && self.final_std.is_finite()) {
+            return Err(TrainError::FinalStd(self.final_std));
+        }
+        Ok(self.task.check()?)
     }
 }
 
@@ -70,6 +90,12 @@ pub enum TrainError {
         "motions `{first}` and `{other}` put different bodies on the ground, and one policy sees the contacts of one set; train them apart"
     )]
     OtherContacts { first: String, other: String },
+    #[error("{environments} environments are too few for {motions} motions: each motion needs one")]
+    TooFewEnvironments { motions: usize, environments: usize },
+    #[error(
+        "final_std is {0}, and must be positive: it is the share of the action noise that is left at the end"
+    )]
+    FinalStd(f64),
     #[error("there is no motion to learn")]
     NoMotion,
 }
@@ -79,13 +105,13 @@ pub enum TrainError {
 pub struct Metrics {
     pub iteration: u64,
     pub samples: u64,
-    /// Mean sum of rewards over the episodes that ended.
+    /// Mean sum of rewards over the episodes that ended; `None` where none did.
     #[serde(rename = "return")]
-    pub episode_return: f64,
+    pub episode_return: Option<f64>,
     /// Mean over those episodes of return ÷ the steps that a perfect one would have had.
-    pub normalized_return: f64,
+    pub normalized_return: Option<f64>,
     /// Mean length of those episodes, seconds.
-    pub episode_length: f64,
+    pub episode_length: Option<f64>,
     /// Episodes that ended.
     pub episodes: u64,
     #[serde(flatten)]
@@ -111,6 +137,8 @@ pub struct Trainer {
     normalizer: Normalizer,
     groups: Vec<Group>,
     iteration: u64,
+    /// The environments haven't begun yet, or stand where an earlier state left them.
+    stale: bool,
     control_dt: f64,
     batch: Samples,
 }
@@ -130,25 +158,10 @@ impl Trainer {
     /// # Errors
     /// A plan or a motion that can't be trained.
     pub fn new(plan: Plan, stage: Stage, motions: &[Motion]) -> Result<Self, TrainError> {
-        for (name, value) in [
-            ("environments", plan.environments),
-            ("group", plan.group),
-            ("horizon", plan.horizon),
-        ] {
-            if value == 0 {
-                return Err(TrainError::Zero(name));
-            }
-        }
+        plan.check(motions.len())?;
         let references: Result<Vec<_>, _> = motions
             .iter()
-            .map(|motion| {
-                Reference::new(
-                    motion,
-                    &stage,
-                    motion.duration() + plan.task.episode_s + 1.0,
-                )
-                .map(Arc::new)
-            })
+            .map(|motion| Reference::new(motion, &stage).map(Arc::new))
             .collect();
         let references = references?;
         let contacts = contacts(&references)?;
@@ -175,6 +188,7 @@ impl Trainer {
             learner,
             groups,
             iteration: 0,
+            stale: true,
             batch: Samples::default(),
         })
     }
@@ -227,6 +241,7 @@ impl Trainer {
         self.learner.restore(state.learner)?;
         self.normalizer = state.normalizer;
         self.iteration = state.iteration;
+        self.stale = true;
         Ok(())
     }
 
@@ -259,15 +274,22 @@ impl Trainer {
     fn schedule_noise(&mut self) -> f64 {
         let done = (self.samples() as f64 / self.plan.samples.max(1) as f64).min(1.0);
         let std = self.plan.ppo.initial_std * (1.0 + (self.plan.final_std - 1.0) * done);
-        if !self.plan.ppo.learn_std {
-            self.learner.set_std(std);
+        if self.plan.ppo.learn_std {
+            return self.learner.mean_std();
         }
+        self.learner.set_std(std);
         std
     }
 
     fn play(&mut self) -> Result<(), LearnError> {
-        if self.is_between_rounds() {
-            let (seed, round) = (self.plan.seed, self.iteration / self.plan.round.max(1));
+        if self.is_between_rounds() || self.stale {
+            let (seed, length) = (self.plan.seed, self.plan.round.max(1));
+            // A state from within a round is played on from a stream that no round has.
+            let round = match self.is_between_rounds() {
+                true => self.iteration / length,
+                false => (1 << 40) + self.iteration,
+            };
+            self.stale = false;
             self.groups
                 .par_iter_mut()
                 .for_each(|group| group.restart(seed, round));
@@ -328,7 +350,10 @@ impl Trainer {
     fn metrics(&self, update: UpdateStats, action_std: f64) -> Metrics {
         let buffers = || self.groups.iter().map(|group| &group.buffer);
         let episodes: Vec<_> = buffers().flat_map(|b: &Buffer| &b.episodes).collect();
-        let n = episodes.len().max(1) as f64;
+        let mean = |value: &dyn Fn(&Episode) -> f64| {
+            let sum: f64 = episodes.iter().map(|episode| value(episode)).sum();
+            (!episodes.is_empty()).then(|| sum / episodes.len() as f64)
+        };
         let steps = buffers().map(|b| b.ends.len()).sum::<usize>().max(1) as f64;
         let reward_terms = TERM_NAMES.iter().enumerate().map(|(i, name)| {
             let sum: f64 = buffers().map(|b| b.terms[i]).sum();
@@ -337,14 +362,9 @@ impl Trainer {
         Metrics {
             iteration: self.iteration,
             samples: self.samples(),
-            episode_return: episodes.iter().map(|e| f64::from(e.reward)).sum::<f64>() / n,
-            normalized_return: episodes
-                .iter()
-                .map(|e| f64::from(e.reward) / e.possible)
-                .sum::<f64>()
-                / n,
-            episode_length: episodes.iter().map(|e| f64::from(e.steps)).sum::<f64>() / n
-                * self.control_dt,
+            episode_return: mean(&|e| f64::from(e.reward)),
+            normalized_return: mean(&|e| f64::from(e.reward) / e.possible),
+            episode_length: mean(&|e| f64::from(e.steps) * self.control_dt),
             episodes: episodes.len() as u64,
             update,
             action_std,
@@ -356,7 +376,10 @@ impl Trainer {
 /// Contact links of the motions, which must be the same for all.
 fn contacts(references: &[Arc<Reference>]) -> Result<usize, TrainError> {
     let first = references.first().ok_or(TrainError::NoMotion)?;
-    match references.iter().find(|r| r.contact_links != first.contact_links) {
+    match references
+        .iter()
+        .find(|r| r.contact_links != first.contact_links)
+    {
         Some(other) => Err(TrainError::OtherContacts {
             first: first.name.clone(),
             other: other.name.clone(),

@@ -186,7 +186,14 @@ fn drives(joint: &LinkJoint) -> Vec<(JointAxis, Drive)> {
             drives,
             locked: Some(_),
             ..
-        } => vec![(y, drives[1]), (z, drives[2])],
+        } => {
+            // The joint's own axes are turned against the link's, along which the gains are given.
+            let turn = basis(joint);
+            vec![
+                (y, drives[(turn * Vector3::y()).iamax()]),
+                (z, drives[(turn * Vector3::z()).iamax()]),
+            ]
+        }
         LinkJoint::Ball { drives, .. } => vec![(x, drives[0]), (y, drives[1]), (z, drives[2])],
     }
 }

@@ -220,7 +220,9 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
             drive: *drive,
             limit: *limit,
         }),
-        [_, _] | [_, _, _] => Ok(ball_of_hinges(&hinges)),
+        [_, _] | [_, _, _] => {
+            ball_of_hinges(&hinges).ok_or_else(|| SimError::ParallelHinges { body: name() })
+        }
         _ => Err(SimError::TooManyJoints {
             body: name(),
             count: body.joints.len(),
@@ -229,7 +231,7 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
 }
 
 /// Hinges that meet in one body act as a ball joint whose gains are those of the nearest hinge.
-fn ball_of_hinges(hinges: &[(Vector3<f64>, Drive, [f64; 2])]) -> LinkJoint {
+fn ball_of_hinges(hinges: &[(Vector3<f64>, Drive, [f64; 2])]) -> Option<LinkJoint> {
     let nearest = |axis: Vector3<f64>| {
         let mut best = hinges[0];
         for hinge in hinges {
@@ -252,12 +254,15 @@ fn ball_of_hinges(hinges: &[(Vector3<f64>, Drive, [f64; 2])]) -> LinkJoint {
         nearest(Vector3::y()),
         nearest(Vector3::z()),
     ];
-    let locked = (hinges.len() == 2).then(|| hinges[0].0.cross(&hinges[1].0).normalize());
-    LinkJoint::Ball {
+    let locked = match hinges {
+        [a, b] => Some(a.0.cross(&b.0).try_normalize(1e-6)?),
+        _ => None,
+    };
+    Some(LinkJoint::Ball {
         drives: along.map(|a| a.0),
         limits: along.map(|a| a.1),
         locked,
-    }
+    })
 }
 
 /// A rotation whose X axis is `axis`.

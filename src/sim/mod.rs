@@ -68,6 +68,8 @@ pub enum SimError {
         "body `{body}` has {count} joints; one ball joint or up to three hinges can be simulated"
     )]
     TooManyJoints { body: String, count: usize },
+    #[error("two hinges of body `{body}` turn about the same axis: make them one")]
+    ParallelHinges { body: String },
     #[error("the root body `{body}` must have a free joint and nothing else")]
     RootIsNotFree { body: String },
     #[error("body `{body}` starts a second character; only one root is simulated")]

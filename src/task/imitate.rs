@@ -222,10 +222,10 @@ impl Imitate {
             .inverse_transform_vector(&(mine.angular - other.angular));
         match &self.stage.character.links[link].joint {
             LinkJoint::Free => Target::Free,
-            LinkJoint::Ball { drives, .. } => {
+            LinkJoint::Ball { drives, locked, .. } => {
                 let lead = Vector3::from_fn(|k, _| lag(&drives[k]) * rate[k]);
                 let added = Vector3::from_column_slice(action) * scale;
-                Target::Ball(turn * UnitQuaternion::from_scaled_axis(lead + added))
+                Target::Ball(turn * UnitQuaternion::from_scaled_axis(free(lead + added, locked)))
             }
             LinkJoint::Hinge { axis, drive, limit } => {
                 let axis = axis.cast::<f32>();
@@ -234,6 +234,14 @@ impl Imitate {
                 Target::Hinge(angle.clamp(limit[0] as f32 - 0.5, limit[1] as f32 + 0.5))
             }
         }
+    }
+}
+
+/// The part of a rotation vector that a joint with a locked axis can follow.
+fn free(v: Vector3<f32>, locked: &Option<Vector3<f64>>) -> Vector3<f32> {
+    match locked.map(|axis| axis.cast::<f32>()) {
+        Some(axis) => v - axis * axis.dot(&v),
+        None => v,
     }
 }
 
@@ -254,9 +262,9 @@ fn absolute(joint: &LinkJoint, action: &[f32], reach: f32) -> Target {
     match joint {
         LinkJoint::Free => Target::Free,
         LinkJoint::Hinge { limit, .. } => Target::Hinge(place(limit, action[0])),
-        LinkJoint::Ball { limits, .. } => {
+        LinkJoint::Ball { limits, locked, .. } => {
             let v = Vector3::from_fn(|k, _| place(&limits[k], action[k]));
-            Target::Ball(UnitQuaternion::from_scaled_axis(v))
+            Target::Ball(UnitQuaternion::from_scaled_axis(free(v, locked)))
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::dynamics::{Dynamics, Masses};
 use super::setting::{Stage, TaskError};
 use crate::clip::LoopMode;
-use crate::motion::Motion;
+use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -30,31 +30,24 @@ pub struct Reference {
     /// Link states, frame after frame.
     frames: Vec<Vec<LinkState>>,
     contacts: Vec<Vec<bool>>,
-    /// World from cycle number n, as many as an episode can see.
-    cycles: Vec<Isometry3<f32>>,
+    cycle: Cycle,
     masses: Masses,
     /// Links that the motion puts on the ground.
     pub contact_links: Vec<usize>,
 }
 
 impl Reference {
-    /// `horizon` is the latest time that will be asked for, in seconds.
-    ///
     /// # Errors
     /// A motion of another skeleton, or of a single frame.
-    pub fn new(motion: &Motion, stage: &Stage, horizon: f64) -> Result<Self, TaskError> {
+    pub fn new(motion: &Motion, stage: &Stage) -> Result<Self, TaskError> {
         let skeleton = &stage.skeleton;
-        if motion.skeleton_sha256 != skeleton.sha256 {
-            let (motion, skeleton) = (motion.skeleton_name.clone(), skeleton.name.clone());
-            return Err(TaskError::OtherSkeleton { motion, skeleton });
-        }
+        motion.check_skeleton(skeleton)?;
         if motion.qpos.len() < 2 {
             return Err(TaskError::TooShort {
                 frames: motion.qpos.len(),
             });
         }
         let duration = motion.duration();
-        let cycles = (horizon / duration).ceil() as i64 + 2;
         Ok(Reference {
             name: motion.name.clone(),
             fps: motion.fps,
@@ -64,7 +57,7 @@ impl Reference {
                 .map(|f| link_states(motion, skeleton, stage, f))
                 .collect(),
             contacts: motion.tracks.contact.clone(),
-            cycles: (0..cycles).map(|n| motion.cycle_offset(n).cast()).collect(),
+            cycle: motion.cycle,
             masses: Masses::new(&stage.character),
             contact_links: motion
                 .contact_bodies
@@ -86,6 +79,12 @@ impl Reference {
     /// Whether the motion has nothing more to show at `time`.
     pub fn is_over(&self, time: f64) -> bool {
         self.loop_mode == LoopMode::Clamp && time >= self.duration - 1e-9
+    }
+
+    /// Largest angular momentum of all frames, kg·m²/s.
+    pub fn largest_momentum(&self) -> f32 {
+        let momentum = |links: &Vec<LinkState>| self.masses.dynamics(links).angular_momentum.norm();
+        self.frames.iter().map(momentum).fold(0.0, f32::max)
     }
 
     pub(crate) fn masses(&self) -> &Masses {
@@ -110,7 +109,7 @@ impl Reference {
         let last = self.frames.len() - 1;
         let frame = (at.floor() as usize).min(last - 1);
         let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
-        let offset = self.cycles[cycle.min(self.cycles.len() - 1)];
+        let offset = self.cycle.offset(cycle).cast();
         for (link, (a, b)) in sample
             .links
             .iter_mut()
@@ -124,13 +123,13 @@ impl Reference {
         sample.phase = (within / self.duration) as f32;
     }
 
-    fn split(&self, time: f64) -> (usize, f64) {
+    fn split(&self, time: f64) -> (i64, f64) {
         match self.loop_mode {
             LoopMode::Clamp => (0, time.clamp(0.0, self.duration)),
             LoopMode::Wrap => {
                 let cycle = (time / self.duration).floor().max(0.0);
                 (
-                    cycle as usize,
+                    cycle as i64,
                     (time - cycle * self.duration).clamp(0.0, self.duration),
                 )
             }

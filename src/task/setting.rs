@@ -1,6 +1,7 @@
 //! What a task can be told, and the stage on which it plays.
 
 use crate::humanoid::Slot;
+use crate::motion::MotionError;
 use crate::sim::{Character, Settings, SimError};
 use crate::skeleton::Skeleton;
 use serde::{Deserialize, Serialize};
@@ -91,13 +92,87 @@ impl Default for Setting {
     }
 }
 
+impl Setting {
+    /// # Errors
+    /// A number that no task can have.
+    pub fn check(&self) -> Result<(), TaskError> {
+        let w = &self.rewards;
+        let weights = [
+            w.pose,
+            w.velocity,
+            w.position,
+            w.root,
+            w.root_velocity,
+            w.com,
+            w.angular_momentum,
+        ];
+        let least = weights.iter().copied().fold(f32::INFINITY, f32::min);
+        let physics = &self.physics;
+        let positive = f64::MIN_POSITIVE..=1e6;
+        let checks = [
+            ("control_hz", physics.control_hz, 1.0..=1e4, "1 to 10000"),
+            (
+                "steps_per_control",
+                f64::from(physics.steps_per_control),
+                1.0..=1e3,
+                "1 to 1000",
+            ),
+            (
+                "substeps",
+                f64::from(physics.substeps),
+                1.0..=1e3,
+                "1 to 1000",
+            ),
+            ("episode_s", self.episode_s, positive.clone(), "positive"),
+            (
+                "the smallest reward weight",
+                f64::from(least),
+                0.0..=f64::MAX,
+                "0 or more",
+            ),
+            (
+                "the sum of the reward weights",
+                f64::from(weights.iter().sum::<f32>()),
+                positive.clone(),
+                "positive",
+            ),
+            (
+                "the distance that ends an episode",
+                f64::from(self.terminations.distance),
+                positive,
+                "positive",
+            ),
+        ];
+        for (name, value, range, text) in checks {
+            if !range.contains(&value) {
+                return Err(TaskError::Setting {
+                    name,
+                    value,
+                    range: text,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Why a task can't be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum TaskError {
     #[error(transparent)]
     Sim(#[from] SimError),
-    #[error("the motion is made for skeleton `{motion}`, not for `{skeleton}`: retarget it again")]
-    OtherSkeleton { motion: String, skeleton: String },
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    #[error("{name} is {value}, and must be {range}")]
+    Setting {
+        name: &'static str,
+        value: f64,
+        range: &'static str,
+    },
+    #[error(
+        "skeleton `{skeleton}` stands {leg} m tall from hip to sole, so its size can't be judged: give it slots for hips and legs"
+    )]
+    NoLegs { skeleton: String, leg: f64 },
     #[error("the motion has {frames} frame(s), and imitation needs at least two")]
     TooShort { frames: usize },
 }
@@ -130,6 +205,12 @@ impl Stage {
             .filter_map(|slot| skeleton.slots.get(slot).copied())
             .collect();
         let leg = skeleton.leg_length();
+        if !(leg.is_finite() && leg > 0.0) {
+            return Err(TaskError::NoLegs {
+                skeleton: skeleton.name,
+                leg,
+            });
+        }
         let momentum_scale = (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32;
         Ok(Stage {
             skeleton,

@@ -114,8 +114,7 @@ impl Bench {
             .map_err(broken)?
             .motion;
         let stage = Arc::new(Stage::new(skeleton).map_err(broken)?);
-        let reference =
-            Reference::new(&motion, &stage, motion.duration() + HORIZON_S + 1.0).map_err(broken)?;
+        let reference = Reference::new(&motion, &stage).map_err(broken)?;
         let reference = Arc::new(reference);
         Ok(Self {
             plan,

@@ -50,6 +50,10 @@ pub fn text(results: &[(String, Evaluation)]) -> String {
         let rows = [
             ("survival", percent(e.survival)),
             (
+                "survival, from the first frame",
+                percent(e.survival_from_start),
+            ),
+            (
                 "success, mean error below 0.5 m",
                 percent(e.success_mean_0_5),
             ),

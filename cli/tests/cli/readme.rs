@@ -24,8 +24,14 @@ fn arguments(command: &str) -> Option<Vec<&str>> {
         .strip_prefix("cargo run --release -- ")
         .or_else(|| command.strip_prefix("mimic "));
     if rest.is_none() {
-        let builds = ["cargo test --release --workspace", "cargo install --path cli"];
-        assert!(builds.contains(&command), "neither mimic nor a known build: `{command}`");
+        let builds = [
+            "cargo test --release --workspace",
+            "cargo install --path cli",
+        ];
+        assert!(
+            builds.contains(&command),
+            "neither mimic nor a known build: `{command}`"
+        );
     }
     rest.map(|rest| rest.split_whitespace().collect())
 }
@@ -38,8 +44,16 @@ fn every_command_of_the_readme_works() {
     bench.write("clips/kick.fbx", &kick);
     bench.write("kick.fbx", &kick);
     let commands = commands();
-    let lines: Vec<_> = commands.iter().filter_map(|command| arguments(command)).collect();
-    assert!(lines.iter().any(|line| line == &["train", "clips/kick.fbx"]), "the first command");
+    let lines: Vec<_> = commands
+        .iter()
+        .filter_map(|command| arguments(command))
+        .collect();
+    assert!(
+        lines
+            .iter()
+            .any(|line| line == &["train", "clips/kick.fbx"]),
+        "the first command"
+    );
     for mut line in lines {
         if line[0] == "train" {
             // One iteration shows that it works; that it learns is recorded in docs/results.md.
@@ -47,10 +61,20 @@ fn every_command_of_the_readme_works() {
         }
         bench.mimic(&line).assert().success();
     }
-    for made in ["runs/kick/policy.safetensors", "runs/kick/eval.json", "runs/kick/replay.rrd"] {
+    for made in [
+        "runs/kick/policy.safetensors",
+        "runs/kick/eval.json",
+        "runs/kick/replay.rrd",
+    ] {
         assert!(bench.path(made).exists(), "{made}");
     }
-    for made in ["kick.clip", "kick.motion", "kick.svg", "kick.rrd", "reference.rrd"] {
+    for made in [
+        "kick.clip",
+        "kick.motion",
+        "kick.svg",
+        "kick.rrd",
+        "reference.rrd",
+    ] {
         assert!(bench.path(made).exists(), "{made}");
     }
 }

@@ -49,10 +49,10 @@ impl Progress {
     pub fn show(&self, metrics: &Metrics, line: &Value, printer: &Printer) -> Outcome {
         let rate = line["samples_per_second"].as_f64().unwrap_or_default();
         let message = format!(
-            "{:.1}k samples/s  return {:.3}  episode {:.1} s",
+            "{:.1}k samples/s  return {}  episode {} s",
             rate / 1e3,
-            metrics.normalized_return,
-            metrics.episode_length
+            number(metrics.normalized_return, 3),
+            number(metrics.episode_length, 1),
         );
         self.bar.set_position(metrics.samples);
         if printer.is_json() {
@@ -82,4 +82,9 @@ fn seconds_before(run: &Run) -> f64 {
         .and_then(|line| serde_json::from_str::<Value>(line).ok());
     last.and_then(|line| line["seconds"].as_f64())
         .unwrap_or(0.0)
+}
+
+/// A figure of the episodes that ended, if any did.
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
 }
