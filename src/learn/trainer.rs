@@ -44,7 +44,7 @@ impl Default for Plan {
             ppo: Config::default(),
             hidden: vec![256, 128],
             environments: 64,
-            group: 16,
+            group: 8,
             horizon: 64,
             round: 20,
             samples: 4_000_000,
