@@ -6,8 +6,11 @@ Needs jax and safetensors. From the root of the repository:
 
 builds and runs `examples/ppo_update.rs`, then recomputes its update in 64-bit floats from the published formulas, with
 gradients by automatic differentiation. Every figure is the largest absolute difference over the largest absolute value
-of the reference. Ends with status 1 when one of them is above its bound. The change of the parameters has a wider bound
-in 32 bits: it is some thousandths of parameters near 1, which are themselves rounded to 6e-8.
+of the reference. Ends with status 1 when one of them is above its bound, 1e-5 in 32 bits.
+
+The change of the parameters is compared as a whole, by Euclidean norms. Adam divides a gradient by its own size, so a
+parameter whose gradient cancels almost to nothing moves by a step that rounding decides: by the largest difference,
+this update computed by JAX in 32 bits is 3e-4 from itself in 64.
 """
 
 import json
@@ -148,6 +151,10 @@ def difference(found, expected):
     return float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
 
 
+def distance(found, expected):
+    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
 def compare(path):
     tensors, metadata = load(path)
     config, layout, stats = (metadata[key] for key in ("config", "layout", "stats"))
@@ -178,7 +185,7 @@ def compare(path):
     tree, records = update(tree, data, tensors["order"].astype(int), config)
     after = flatten(tree, layout)
     figures["parameters after"] = difference(tensors["parameters_after"], after)
-    figures["change of parameters"] = difference(tensors["parameters_after"] - before, after - before)
+    figures["change of parameters"] = distance(tensors["parameters_after"] - before, after - before)
     means = records.mean(axis=0)
     names = ("policy_loss", "value_loss", "action_bound_loss", "clip_fraction", "gradient_norm")
     figures["statistics"] = difference([stats[name] for name in names], means[[0, 1, 2, 4, 5]])
@@ -201,9 +208,8 @@ def main():
         failed = False
         for name, bound in (("f64", 1e-12), ("f32", 1e-5)):
             for what, figure in compare(pathlib.Path(folder) / f"{name}.safetensors").items():
-                limit = 10 * bound if what == "change of parameters" else bound
-                failed |= not figure <= limit
-                print(f"  {what:24} {figure:.1e}{'' if figure <= limit else f'  above {limit:.0e}'}")
+                failed |= not figure <= bound
+                print(f"  {what:24} {figure:.1e}{'' if figure <= bound else f'  above {bound:.0e}'}")
     sys.exit(failed)
 
 
