@@ -2,6 +2,8 @@
 
 mod episode;
 mod metrics;
+#[cfg(test)]
+mod tests;
 
 pub use episode::{Frame, Trace, play};
 pub use metrics::{Evaluation, measure};

@@ -78,6 +78,8 @@ impl Config {
     pub(super) fn check(&self) -> Result<(), LearnError> {
         let positive = f64::MIN_POSITIVE..=f64::MAX;
         let unit = 0.0..=1.0;
+        let least = 0.0..=f64::MAX;
+        let decay = 0.0..=1.0 - f64::EPSILON;
         let settings = [
             ("gamma", self.gamma, &unit, "0..=1"),
             ("lambda", self.lambda, &unit, "0..=1"),
@@ -88,6 +90,33 @@ impl Config {
                 self.minibatch as f64,
                 &(1.0..=1e9),
                 "1..=1000000000",
+            ),
+            (
+                "value_coefficient",
+                self.value_coefficient,
+                &least,
+                "0 or more",
+            ),
+            (
+                "entropy_coefficient",
+                self.entropy_coefficient,
+                &least,
+                "0 or more",
+            ),
+            (
+                "action_bound_coefficient",
+                self.action_bound_coefficient,
+                &least,
+                "0 or more",
+            ),
+            ("action_bound", self.action_bound, &least, "0 or more"),
+            ("adam.beta1", self.adam.beta1, &decay, "0 up to below 1"),
+            ("adam.beta2", self.adam.beta2, &decay, "0 up to below 1"),
+            (
+                "adam.epsilon",
+                self.adam.epsilon,
+                &positive,
+                "the positive numbers",
             ),
             ("shards", self.shards as f64, &(1.0..=1024.0), "1..=1024"),
             (

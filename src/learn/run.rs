@@ -6,7 +6,7 @@ use super::{
 };
 use crate::motion::{Motion, MotionError};
 use crate::skeleton::{Skeleton, SkeletonError};
-use crate::task::{Reference, Stage, TaskError};
+use crate::task::{Reference, Setting, Stage, TaskError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::fs;
@@ -54,6 +54,16 @@ struct Config {
     skeleton: String,
     motions: Vec<String>,
     plan: Plan,
+}
+
+/// What a policy file says beside its network: all that it takes to act.
+#[derive(Deserialize)]
+struct Performs {
+    task: Setting,
+    /// Name of the character.
+    skeleton: String,
+    mjcf: String,
+    slots: String,
 }
 
 /// A run on disk.
@@ -205,7 +215,13 @@ impl Run {
             parameters: learner.parameters.clone(),
             normalizer: normalizer.clone(),
             tensors: Default::default(),
-            details: json!({ "task": self.plan.task, "skeleton": self.skeleton.name }),
+            details: json!({
+                "task": self.plan.task,
+                "skeleton": self.skeleton.name,
+                "mjcf": self.skeleton.mjcf,
+                "slots": self.skeleton.slots_json(),
+                "observation": trainer.observation(),
+            }),
         };
         let checkpoint = Checkpoint {
             iteration,
@@ -252,7 +268,16 @@ impl Run {
             return Err(RunError::NoPolicy(self.dir.clone()));
         }
         let file = PolicyFile::load(&path)?;
-        let stage = Arc::new(Stage::new(self.skeleton.clone())?);
+        let performs: Performs =
+            serde_json::from_value(file.details).map_err(|e| corrupt(&path, e))?;
+        let Performs {
+            task,
+            skeleton,
+            mjcf,
+            slots,
+        } = performs;
+        let skeleton = Skeleton::from_mjcf(&skeleton, &mjcf, Some(&slots))?;
+        let stage = Arc::new(Stage::new(skeleton)?);
         let mut references = Vec::new();
         for motion in &self.motions {
             references.push(Arc::new(Reference::new(motion, &stage)?));
@@ -263,7 +288,7 @@ impl Run {
             &file.normalizer,
             stage,
             references,
-            self.plan.task,
+            task,
         )?)
     }
 

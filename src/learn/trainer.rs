@@ -6,7 +6,7 @@ use super::{
     Trajectories, UpdateStats, advantages,
 };
 use crate::motion::Motion;
-use crate::task::{Reference, Setting, Stage, TERM_NAMES, TaskError, observation_size};
+use crate::task::{Block, Reference, Setting, Stage, TERM_NAMES, TaskError, layout};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -135,6 +135,7 @@ pub struct Trainer {
     plan: Plan,
     learner: Learner<f32>,
     normalizer: Normalizer,
+    observation: Vec<Block>,
     groups: Vec<Group>,
     iteration: u64,
     /// The environments haven't begun yet, or stand where an earlier state left them.
@@ -165,8 +166,9 @@ impl Trainer {
             .collect();
         let references = references?;
         let contacts = contacts(&references)?;
+        let observation = layout(&stage, contacts);
         let spec = PolicySpec {
-            observation: observation_size(&stage, contacts),
+            observation: observation.iter().map(|block| block.size).sum(),
             action: stage.character.dof,
             hidden: plan.hidden.clone(),
             activation: Default::default(),
@@ -186,6 +188,7 @@ impl Trainer {
             control_dt: plan.task.physics.control_dt(),
             plan,
             learner,
+            observation,
             groups,
             iteration: 0,
             stale: true,
@@ -199,6 +202,11 @@ impl Trainer {
 
     pub fn learner(&self) -> &Learner<f32> {
         &self.learner
+    }
+
+    /// The parts of what the policy sees, in order.
+    pub fn observation(&self) -> &[Block] {
+        &self.observation
     }
 
     pub fn normalizer(&self) -> &Normalizer {
@@ -251,8 +259,15 @@ impl Trainer {
     /// A quantity that stopped being finite.
     pub fn iterate(&mut self) -> Result<Metrics, LearnError> {
         let std = self.schedule_noise();
+        if self.normalizer.count == 0.0 {
+            self.meet_observations()?;
+        }
         self.play()?;
         self.gather()?;
+        // Before anything is learned from them: this is where a number that isn't finite is named.
+        for group in &self.groups {
+            self.normalizer.update(&group.buffer.raw)?;
+        }
         let batch = Batch {
             observations: &self.batch.observations,
             actions: &self.batch.actions,
@@ -264,9 +279,6 @@ impl Trainer {
         let update = self
             .learner
             .update(&batch, &mut stream(self.plan.seed, 0, self.iteration + 1))?;
-        for group in &self.groups {
-            self.normalizer.update(&group.buffer.raw)?;
-        }
         self.iteration += 1;
         Ok(self.metrics(update, std))
     }
@@ -281,18 +293,27 @@ impl Trainer {
         std
     }
 
+    /// Plays once without learning, so that the first samples are normalised like all later ones.
+    fn meet_observations(&mut self) -> Result<(), LearnError> {
+        self.play()?;
+        for group in &self.groups {
+            self.normalizer.update(&group.buffer.raw)?;
+        }
+        self.stale = true;
+        Ok(())
+    }
+
     fn play(&mut self) -> Result<(), LearnError> {
         if self.is_between_rounds() || self.stale {
-            let (seed, length) = (self.plan.seed, self.plan.round.max(1));
-            // A state from within a round is played on from a stream that no round has.
-            let round = match self.is_between_rounds() {
-                true => self.iteration / length,
-                false => (1 << 40) + self.iteration,
+            // A state from within a round is played on from streams that no round has.
+            let (seed, part) = match self.is_between_rounds() {
+                true => (self.plan.seed, self.iteration / self.plan.round.max(1)),
+                false => (!self.plan.seed, self.iteration),
             };
             self.stale = false;
             self.groups
                 .par_iter_mut()
-                .for_each(|group| group.restart(seed, round));
+                .for_each(|group| group.restart(seed, part));
         }
         let normalizer = self.normalizer.frozen(OBSERVATION_LIMIT);
         let actor = Actor {

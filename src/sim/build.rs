@@ -145,55 +145,47 @@ fn joint(link: &Link) -> GenericJoint {
         convert::pose(&Isometry3::from_parts(Translation3::from(at), turn).cast())
     };
     let axes = basis(&link.joint);
-    let builder = match &link.joint {
-        LinkJoint::Hinge { .. } => GenericJointBuilder::new(JointAxesMask::LOCKED_REVOLUTE_AXES),
-        LinkJoint::Ball {
-            locked: Some(_), ..
-        } => GenericJointBuilder::new(JointAxesMask::LOCKED_SPHERICAL_AXES | JointAxesMask::ANG_X),
-        _ => GenericJointBuilder::new(JointAxesMask::LOCKED_SPHERICAL_AXES),
+    let locked = match &link.joint {
+        LinkJoint::Hinge { .. } => JointAxesMask::LOCKED_REVOLUTE_AXES,
+        _ => JointAxesMask::LOCKED_SPHERICAL_AXES,
     };
-    let mut joint = builder
+    let mut joint = GenericJointBuilder::new(locked)
         .local_frame1(frame(parent_anchor.coords, link.rest.rotation * axes))
         .local_frame2(frame(link.anchor, axes))
         .contacts_enabled(false)
         .build();
     for (axis, drive) in drives(&link.joint) {
-        joint
-            .set_motor_model(axis, MotorModel::ForceBased)
-            .set_motor_position(axis, 0.0, drive.kp as f32, drive.kd as f32)
-            .set_motor_max_force(axis, drive.force_limit.min(f64::from(f32::MAX)) as f32);
+        // A motor without gains would be a rigid brake in rapier, not a joint that swings freely.
+        if drive.kp > 0.0 || drive.kd > 0.0 {
+            joint
+                .set_motor_model(axis, MotorModel::ForceBased)
+                .set_motor_position(axis, 0.0, drive.kp as f32, drive.kd as f32)
+                .set_motor_max_force(axis, drive.force_limit.min(f64::from(f32::MAX)) as f32);
+        }
+    }
+    if let LinkJoint::Hinge { axis, .. } = &link.joint
+        && axis.is_limited()
+    {
+        joint.set_limits(JointAxis::AngX, axis.limit.map(|end| end as f32));
     }
     joint
 }
 
-/// The joint frame's axes in the link's frame: X along a hinge, or along a ball's locked direction.
+/// The joint frame's axes in the link's frame: X along a hinge.
 pub(super) fn basis(joint: &LinkJoint) -> UnitQuaternion<f64> {
     match joint {
-        LinkJoint::Hinge { axis, .. } => x_along(axis),
-        LinkJoint::Ball {
-            locked: Some(axis), ..
-        } => x_along(axis),
+        LinkJoint::Hinge { axis, .. } => x_along(&axis.direction),
         _ => UnitQuaternion::identity(),
     }
 }
 
 fn drives(joint: &LinkJoint) -> Vec<(JointAxis, Drive)> {
-    let [x, y, z] = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ];
+    let axes = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ];
     match joint {
         LinkJoint::Free => Vec::new(),
-        LinkJoint::Hinge { drive, .. } => vec![(x, *drive)],
-        LinkJoint::Ball {
-            drives,
-            locked: Some(_),
-            ..
-        } => {
-            // The joint's own axes are turned against the link's, along which the gains are given.
-            let turn = basis(joint);
-            vec![
-                (y, drives[(turn * Vector3::y()).iamax()]),
-                (z, drives[(turn * Vector3::z()).iamax()]),
-            ]
+        LinkJoint::Hinge { drive, .. } => vec![(JointAxis::AngX, *drive)],
+        LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => {
+            axes.into_iter().zip(*drives).collect()
         }
-        LinkJoint::Ball { drives, .. } => vec![(x, drives[0]), (y, drives[1]), (z, drives[2])],
     }
 }

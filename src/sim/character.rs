@@ -3,32 +3,52 @@
 use super::SimError;
 use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton};
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
 
 /// How a link turns in its parent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkJoint {
     /// The root: moves freely.
     Free,
-    /// Turns any way about the anchor. `axes` are the free directions where there are fewer than three.
+    /// Turns any way about the anchor; drives and limits are those of its exponential map along x, y, z.
     Ball {
         drives: [Drive; 3],
         limits: [[f64; 2]; 3],
-        locked: Option<Vector3<f64>>,
+    },
+    /// Two or three hinges of one body, turning it one after the other. The simulation joins it as a ball, aimed at
+    /// what the hinges can reach: a direction that none of two hinges has is held by a drive as stiff as theirs.
+    Hinges {
+        hinges: Vec<HingeAxis>,
+        /// Along the link's x, y, z.
+        drives: [Drive; 3],
     },
     /// Turns about a unit axis in the link's frame.
-    Hinge {
-        axis: Vector3<f64>,
-        drive: Drive,
-        limit: [f64; 2],
-    },
+    Hinge { axis: HingeAxis, drive: Drive },
+}
+
+/// What a hinge turns about, and how far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HingeAxis {
+    /// Unit vector in the link's frame.
+    pub direction: Vector3<f64>,
+    /// Radians.
+    pub limit: [f64; 2],
+}
+
+impl HingeAxis {
+    /// A range of a full turn stops nothing.
+    pub(super) fn is_limited(&self) -> bool {
+        self.limit[1] - self.limit[0] < TAU - 1e-6
+    }
 }
 
 impl LinkJoint {
-    /// Number of drive coordinates: 3 for a ball, 1 for a hinge.
+    /// Number of drive coordinates: 3 for a ball, 1 for each hinge.
     pub fn dof(&self) -> usize {
         match self {
             LinkJoint::Free => 0,
             LinkJoint::Ball { .. } => 3,
+            LinkJoint::Hinges { hinges, .. } => hinges.len(),
             LinkJoint::Hinge { .. } => 1,
         }
     }
@@ -189,6 +209,10 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
             _ => Err(SimError::RootIsNotFree { body: name() }),
         };
     }
+    let too_many = || SimError::TooManyJoints {
+        body: name(),
+        count: body.joints.len(),
+    };
     let mut hinges = Vec::new();
     for joint in &body.joints {
         match joint.kind {
@@ -196,73 +220,62 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
                 return Ok(LinkJoint::Ball {
                     drives: [joint.drives[0], joint.drives[1], joint.drives[2]],
                     limits: [joint.limits[0], joint.limits[1], joint.limits[2]],
-                    locked: None,
                 });
             }
-            JointKind::Hinge(axis) => hinges.push((axis, joint.drives[0], joint.limits[0])),
+            JointKind::Hinge(direction) => {
+                let limit = joint.limits[0];
+                hinges.push((HingeAxis { direction, limit }, joint.drives[0]));
+            }
             JointKind::Slide(_) => {
                 return Err(SimError::SlideJoint {
                     body: name(),
                     joint: joint.name.clone(),
                 });
             }
-            _ => {
-                return Err(SimError::TooManyJoints {
-                    body: name(),
-                    count: body.joints.len(),
-                });
-            }
+            _ => return Err(too_many()),
         }
     }
     match hinges.as_slice() {
-        [(axis, drive, limit)] => Ok(LinkJoint::Hinge {
+        [(axis, drive)] => Ok(LinkJoint::Hinge {
             axis: *axis,
             drive: *drive,
-            limit: *limit,
         }),
         [_, _] | [_, _, _] => {
-            ball_of_hinges(&hinges).ok_or_else(|| SimError::ParallelHinges { body: name() })
+            hinges_of_one(&hinges).ok_or_else(|| SimError::ParallelHinges { body: name() })
         }
-        _ => Err(SimError::TooManyJoints {
-            body: name(),
-            count: body.joints.len(),
-        }),
+        _ => Err(too_many()),
     }
 }
 
-/// Hinges that meet in one body act as a ball joint whose gains are those of the nearest hinge.
-fn ball_of_hinges(hinges: &[(Vector3<f64>, Drive, [f64; 2])]) -> Option<LinkJoint> {
-    let nearest = |axis: Vector3<f64>| {
-        let mut best = hinges[0];
+/// Hinges that meet in one body; `None` where neighbours turn about the same axis.
+fn hinges_of_one(hinges: &[(HingeAxis, Drive)]) -> Option<LinkJoint> {
+    for pair in hinges.windows(2) {
+        let across = pair[0].0.direction.cross(&pair[1].0.direction);
+        across.try_normalize(1e-6)?;
+    }
+    Some(LinkJoint::Hinges {
+        drives: [Vector3::x(), Vector3::y(), Vector3::z()].map(|along| gains(hinges, &along)),
+        hinges: hinges.iter().map(|(axis, _)| *axis).collect(),
+    })
+}
+
+/// The drive of the hinge nearest to a direction, or the stiffest where none is near.
+fn gains(hinges: &[(HingeAxis, Drive)], along: &Vector3<f64>) -> Drive {
+    let share = |hinge: &(HingeAxis, Drive)| hinge.0.direction.dot(along).abs();
+    let mut best = hinges[0];
+    for hinge in hinges {
+        if share(hinge) > share(&best) {
+            best = *hinge;
+        }
+    }
+    if share(&best) < 0.5 {
         for hinge in hinges {
-            if hinge.0.dot(&axis).abs() > best.0.dot(&axis).abs() {
+            if hinge.1.kp > best.1.kp {
                 best = *hinge;
             }
         }
-        let flip = best.0.dot(&axis) < 0.0;
-        (
-            best.1,
-            if flip {
-                [-best.2[1], -best.2[0]]
-            } else {
-                best.2
-            },
-        )
-    };
-    let along = [
-        nearest(Vector3::x()),
-        nearest(Vector3::y()),
-        nearest(Vector3::z()),
-    ];
-    let locked = match hinges {
-        [a, b] => Some(a.0.cross(&b.0).try_normalize(1e-6)?),
-        _ => None,
-    };
-    Some(LinkJoint::Ball {
-        drives: along.map(|a| a.0),
-        limits: along.map(|a| a.1),
-        locked,
-    })
+    }
+    best.1
 }
 
 /// A rotation whose X axis is `axis`.

@@ -13,7 +13,7 @@ mod convert;
 mod tests;
 mod world;
 
-pub use character::{Character, Link, LinkJoint};
+pub use character::{Character, HingeAxis, Link, LinkJoint};
 pub use world::{LinkState, Target, World};
 
 use serde::{Deserialize, Serialize};

@@ -30,7 +30,9 @@ fn standing(character: &Character, z: f32) -> Vec<LinkState> {
 fn held(character: &Character) -> Vec<Target> {
     let hold = |joint: &LinkJoint| match joint {
         LinkJoint::Free => Target::Free,
-        LinkJoint::Ball { .. } => Target::Ball(UnitQuaternion::identity()),
+        LinkJoint::Ball { .. } | LinkJoint::Hinges { .. } => {
+            Target::Ball(UnitQuaternion::identity())
+        }
         LinkJoint::Hinge { .. } => Target::Hinge(0.0),
     };
     character
@@ -71,18 +73,21 @@ fn momenta(
 /// Targets that swing every limb, different at every control step.
 fn swinging(character: &Character, step: usize) -> Vec<Target> {
     let at = |i: usize| (step as f32 * 0.35 + i as f32).sin();
-    let targets =
-        character
-            .links
-            .iter()
-            .enumerate()
-            .map(|(i, link)| match link.joint {
-                LinkJoint::Free => Target::Free,
-                LinkJoint::Ball { .. } => Target::Ball(UnitQuaternion::from_scaled_axis(
-                    Vector3::new(0.5 * at(i), 0.8 * at(i + 3), 0.3 * at(i + 5)),
-                )),
-                LinkJoint::Hinge { .. } => Target::Hinge(0.8 + 0.6 * at(i)),
-            });
+    let targets = character
+        .links
+        .iter()
+        .enumerate()
+        .map(|(i, link)| match link.joint {
+            LinkJoint::Free => Target::Free,
+            LinkJoint::Ball { .. } | LinkJoint::Hinges { .. } => {
+                Target::Ball(UnitQuaternion::from_scaled_axis(Vector3::new(
+                    0.5 * at(i),
+                    0.8 * at(i + 3),
+                    0.3 * at(i + 5),
+                )))
+            }
+            LinkJoint::Hinge { .. } => Target::Hinge(0.8 + 0.6 * at(i)),
+        });
     targets.collect()
 }
 
@@ -233,4 +238,116 @@ fn a_ball_drive_reaches_a_large_rotation() {
 #[test]
 fn settings_say_the_physics_rate() {
     assert!((Settings::default().physics_hz() - 240.0).abs() < 1e-12);
+}
+
+/// A trunk with one limb, whose joints are `joints`, and `actuators` on them.
+fn jointed(joints: &str, actuators: &str) -> Character {
+    let text = format!(
+        r#"<mujoco><compiler angle="radian"/><worldbody><body name="trunk"><freejoint/>
+        <geom type="sphere" size="0.3" mass="20"/>
+        <body name="limb" pos="0 0 -0.3">{joints}
+        <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.05" mass="3"/></body></body></worldbody>
+        <actuator>{actuators}</actuator></mujoco>"#
+    );
+    let skeleton = Skeleton::from_mjcf("jointed", &text, None).expect("the text is MJCF");
+    Character::new(&skeleton).expect("it can be simulated")
+}
+
+/// Rotation of the limb in the trunk after `steps` in flight, starting at rest or with the limb turning at `spin`.
+fn limb_after(
+    character: &Character,
+    spin: Vector3<f32>,
+    steps: usize,
+    target: impl Fn(usize) -> Target,
+) -> UnitQuaternion<f32> {
+    let mut world = World::new(character, Settings::default());
+    let mut states = standing(character, 50.0);
+    states[1].angular = spin;
+    world.reset(&states);
+    for step in 0..steps {
+        world.set_targets(&[Target::Free, target(step)]);
+        world.step().expect("flight stays finite");
+    }
+    let [trunk, limb] = [0, 1].map(|i: usize| world.states()[i].pose.rotation);
+    trunk.inverse() * limb
+}
+
+#[test]
+fn a_hinge_stops_at_the_end_of_its_range() {
+    let character = jointed(
+        r#"<joint name="knee" type="hinge" axis="0 1 0" range="0 2"/>"#,
+        r#"<position joint="knee" kp="300" kv="30"/>"#,
+    );
+    for (target, end) in [(-1.5, 0.0), (3.0, 2.0)] {
+        let turn = limb_after(&character, Vector3::zeros(), 60, |_| Target::Hinge(target));
+        let angle = turn.scaled_axis().y;
+        assert!((angle - end).abs() < 0.03, "at {angle}, not {end}");
+    }
+}
+
+#[test]
+fn a_joint_without_a_drive_swings_freely() {
+    let character = jointed(r#"<joint type="hinge" axis="0 1 0"/>"#, "");
+    let spin = Vector3::new(0.0, 3.0, 0.0);
+    let turn = limb_after(&character, spin, 15, |_| Target::Hinge(0.0));
+    assert!(turn.angle() > 1.0, "turned by {} rad only", turn.angle());
+}
+
+#[test]
+fn two_hinges_of_one_body_follow_a_moving_target_together() {
+    let character = jointed(
+        r#"<joint name="a" type="hinge" axis="0 1 0"/><joint name="b" type="hinge" axis="0 0 1"/>"#,
+        r#"<position joint="a" kp="300" kv="30"/><position joint="b" kp="300" kv="30"/>"#,
+    );
+    assert_eq!(character.dof, 2);
+    let at = |step: usize| {
+        let share = (step as f32 / 30.0).min(1.0);
+        UnitQuaternion::from_scaled_axis(Vector3::y() * 0.9 * share)
+            * UnitQuaternion::from_scaled_axis(Vector3::z() * -0.7 * share)
+    };
+    let turn = limb_after(&character, Vector3::zeros(), 75, |step| {
+        Target::Ball(at(step))
+    });
+    assert!(
+        turn.angle_to(&at(75)) < 0.02,
+        "off by {}",
+        turn.angle_to(&at(75))
+    );
+}
+
+#[test]
+fn a_sliding_box_stops_by_coulomb_friction() {
+    let friction = 0.5;
+    let text = format!(
+        r#"<mujoco><worldbody><body name="box"><freejoint/>
+        <geom type="box" size="0.3 0.3 0.05" mass="5" friction="{friction}"/></body></worldbody></mujoco>"#
+    );
+    let skeleton = Skeleton::from_mjcf("box", &text, None).expect("the text is MJCF");
+    let character = Character::new(&skeleton).expect("it can be simulated");
+    let mut world = World::new(&character, Settings::default());
+    let mut states = standing(&character, 0.05);
+    let speed = 2.0;
+    states[0].linear = Vector3::new(1.2, -1.6, 0.0);
+    world.reset(&states);
+    for _ in 0..30 {
+        world.step().expect("sliding stays finite");
+    }
+    let way = world.states()[0].pose.translation.vector.xy().norm();
+    let expected = speed * speed / (2.0 * friction * 9.81);
+    assert!(
+        (way - expected).abs() < 0.05 * expected,
+        "slid {way} m, not v²/2μg = {expected} m"
+    );
+}
+
+#[test]
+fn a_world_that_runs_away_is_told() {
+    let character = humanoid();
+    let mut world = World::new(&character, Settings::default());
+    let mut states = standing(&character, 1.0);
+    states[3].linear = Vector3::new(1e20, 0.0, 0.0);
+    world.reset(&states);
+    assert_eq!(world.step(), Err(Diverged));
+    world.reset(&standing(&character, 1.0));
+    assert_eq!(world.step(), Ok(()), "a reset world works again");
 }

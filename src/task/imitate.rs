@@ -6,7 +6,7 @@ use super::reward::{Terms, terms};
 use super::setting::{Actions, Setting, Stage};
 use super::terminate::{Failure, failure};
 use crate::clip::LoopMode;
-use crate::sim::{LinkJoint, LinkState, Target, World};
+use crate::sim::{HingeAxis, LinkJoint, LinkState, Target, World};
 use crate::skeleton::Drive;
 use crate::task::Dynamics;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -45,6 +45,8 @@ pub struct Imitate {
     next: Sample,
     dynamics: Dynamics,
     targets: Vec<Target>,
+    /// Per contact link of the reference.
+    touching: Vec<bool>,
 }
 
 impl Imitate {
@@ -53,6 +55,7 @@ impl Imitate {
             world: World::new(&stage.character, setting.physics),
             next: reference.blank(),
             targets: vec![Target::Free; stage.character.links.len()],
+            touching: Vec::new(),
             stage,
             reference,
             setting: *setting,
@@ -79,6 +82,8 @@ impl Imitate {
         self.reference.sample(time, &mut self.next);
         self.world.reset(&self.next.links);
         self.dynamics = self.reference.masses().dynamics(self.world.states());
+        // The engine finds contacts only in a step; until then the agent touches what its reference does.
+        self.touching.clone_from(&self.next.contacts);
         self.look_ahead();
     }
 
@@ -106,16 +111,11 @@ impl Imitate {
 
     /// Writes what the policy sees.
     pub fn observe(&self, out: &mut [f32]) {
-        let contacts = self
-            .reference
-            .contact_links
-            .iter()
-            .map(|&link| self.world.contacts()[link]);
         observe(
             &self.stage,
             self.world.states(),
             &self.dynamics,
-            contacts,
+            &self.touching,
             &self.next,
             out,
         );
@@ -134,6 +134,10 @@ impl Imitate {
             };
         }
         let states = self.world.states();
+        let pressed = self.world.contacts();
+        let links = self.reference.contact_links.iter();
+        self.touching.clear();
+        self.touching.extend(links.map(|&link| pressed[link]));
         self.dynamics = self.reference.masses().dynamics(states);
         let terms = terms(
             &self.stage,
@@ -220,28 +224,38 @@ impl Imitate {
             .pose
             .rotation
             .inverse_transform_vector(&(mine.angular - other.angular));
-        match &self.stage.character.links[link].joint {
+        let joint = &self.stage.character.links[link].joint;
+        match joint {
             LinkJoint::Free => Target::Free,
-            LinkJoint::Ball { drives, locked, .. } => {
+            LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => {
                 let lead = Vector3::from_fn(|k, _| lag(&drives[k]) * rate[k]);
-                let added = Vector3::from_column_slice(action) * scale;
-                Target::Ball(turn * UnitQuaternion::from_scaled_axis(free(lead + added, locked)))
+                let added = turned(joint, action) * scale;
+                Target::Ball(turn * UnitQuaternion::from_scaled_axis(lead + added))
             }
-            LinkJoint::Hinge { axis, drive, limit } => {
-                let axis = axis.cast::<f32>();
-                let lead = lag(drive) * rate.dot(&axis);
-                let angle = turn.scaled_axis().dot(&axis) + lead + action[0] * scale;
-                Target::Hinge(angle.clamp(limit[0] as f32 - 0.5, limit[1] as f32 + 0.5))
+            LinkJoint::Hinge { axis, drive } => {
+                let direction = axis.direction.cast::<f32>();
+                let lead = lag(drive) * rate.dot(&direction);
+                let angle = turn.scaled_axis().dot(&direction) + lead + action[0] * scale;
+                let [low, high] = axis.limit.map(|end| end as f32);
+                Target::Hinge(angle.clamp(low - BEYOND_LIMIT, high + BEYOND_LIMIT))
             }
         }
     }
 }
 
-/// The part of a rotation vector that a joint with a locked axis can follow.
-fn free(v: Vector3<f32>, locked: &Option<Vector3<f64>>) -> Vector3<f32> {
-    match locked.map(|axis| axis.cast::<f32>()) {
-        Some(axis) => v - axis * axis.dot(&v),
-        None => v,
+/// How far beyond a hinge's range its drive may aim, radians: to press against the end of the range, or to hold a
+/// load near it. `skeletons/humanoid.xml` has the same in its control ranges.
+const BEYOND_LIMIT: f32 = 0.5;
+
+/// Rotation vector in the link's frame that the action of a joint with several coordinates stands for.
+fn turned(joint: &LinkJoint, action: &[f32]) -> Vector3<f32> {
+    match joint {
+        LinkJoint::Hinges { hinges, .. } => hinges
+            .iter()
+            .zip(action)
+            .map(|(hinge, a)| hinge.direction.cast() * *a)
+            .sum(),
+        _ => Vector3::from_column_slice(action),
     }
 }
 
@@ -261,10 +275,17 @@ fn absolute(joint: &LinkJoint, action: &[f32], reach: f32) -> Target {
     };
     match joint {
         LinkJoint::Free => Target::Free,
-        LinkJoint::Hinge { limit, .. } => Target::Hinge(place(limit, action[0])),
-        LinkJoint::Ball { limits, locked, .. } => {
+        LinkJoint::Hinge { axis, .. } => Target::Hinge(place(&axis.limit, action[0])),
+        LinkJoint::Ball { limits, .. } => {
             let v = Vector3::from_fn(|k, _| place(&limits[k], action[k]));
-            Target::Ball(UnitQuaternion::from_scaled_axis(free(v, locked)))
+            Target::Ball(UnitQuaternion::from_scaled_axis(v))
+        }
+        LinkJoint::Hinges { hinges, .. } => {
+            let turn = |(hinge, a): (&HingeAxis, &f32)| {
+                UnitQuaternion::from_scaled_axis(hinge.direction.cast() * place(&hinge.limit, *a))
+            };
+            let turns = hinges.iter().zip(action).map(turn);
+            Target::Ball(turns.fold(UnitQuaternion::identity(), |all, next| all * next))
         }
     }
 }

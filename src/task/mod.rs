@@ -10,6 +10,8 @@ mod reference;
 mod reward;
 mod setting;
 mod terminate;
+#[cfg(test)]
+mod tests;
 
 pub use dynamics::Dynamics;
 pub use imitate::{Imitate, Outcome, Step};

@@ -6,9 +6,10 @@ use super::reference::Sample;
 use super::setting::Stage;
 use crate::sim::{LinkJoint, LinkState};
 use nalgebra::{UnitQuaternion, Vector3};
+use serde::Serialize;
 
 /// One named part of the observation.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Block {
     pub name: &'static str,
     pub size: usize,
@@ -63,12 +64,21 @@ impl Writer<'_> {
         self.at += 3;
     }
 
+    fn flags(&mut self, flags: &[bool]) {
+        flags.iter().for_each(|f| self.one(f32::from(u8::from(*f))));
+    }
+
     /// The part of a joint-space vector that the joint can have.
     fn joint(&mut self, joint: &LinkJoint, v: Vector3<f32>) {
         match joint {
             LinkJoint::Free => {}
             LinkJoint::Ball { .. } => self.vector(v),
-            LinkJoint::Hinge { axis, .. } => self.one(v.dot(&axis.cast())),
+            LinkJoint::Hinges { hinges, .. } => {
+                for hinge in hinges {
+                    self.one(v.dot(&hinge.direction.cast()));
+                }
+            }
+            LinkJoint::Hinge { axis, .. } => self.one(v.dot(&axis.direction.cast())),
         }
     }
 }
@@ -78,7 +88,7 @@ pub fn observe(
     stage: &Stage,
     links: &[LinkState],
     dynamics: &Dynamics,
-    contacts: impl Iterator<Item = bool>,
+    contacts: &[bool],
     next: &Sample,
     out: &mut [f32],
 ) {
@@ -103,7 +113,7 @@ pub fn observe(
     w.vector(into_root(dynamics.com - center));
     w.vector(into_root(dynamics.com_velocity));
     w.vector(into_root(dynamics.angular_momentum) / stage.momentum_scale);
-    contacts.for_each(|c| w.one(f32::from(u8::from(c))));
+    w.flags(contacts);
     joints(stage, &mut w, |i, p| {
         (relative(stage, links, i, p).inverse() * relative(stage, &next.links, i, p)).scaled_axis()
     });
@@ -115,9 +125,7 @@ pub fn observe(
     w.vector((root.pose.rotation.inverse() * wanted.pose.rotation).scaled_axis());
     w.vector(into_root(wanted.linear - root.linear));
     w.vector(into_root(wanted.angular - root.angular));
-    next.contacts
-        .iter()
-        .for_each(|c| w.one(f32::from(u8::from(*c))));
+    w.flags(&next.contacts);
     let turn = std::f32::consts::TAU * next.phase;
     for value in [
         next.phase,

@@ -5,8 +5,11 @@ use super::setting::{Stage, TaskError};
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
-use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+/// Link states between the table's frames are blended link by link, which shortens a limb that turns at ω by
+/// 1 − cos(ω/2f): at 120 Hz and 12 rad/s by a half per mille, in a table of a clip's own 16 Hz by 7 %.
+const TABLE_HZ: f64 = 120.0;
 
 /// The reference at one time.
 #[derive(Clone, Debug)]
@@ -24,7 +27,8 @@ pub struct Sample {
 #[derive(Clone, Debug)]
 pub struct Reference {
     pub name: String,
-    fps: f64,
+    /// Frames of the table per second.
+    rate: f64,
     loop_mode: LoopMode,
     duration: f64,
     /// Link states, frame after frame.
@@ -47,16 +51,22 @@ impl Reference {
                 frames: motion.qpos.len(),
             });
         }
+        let finer = (TABLE_HZ / motion.fps).ceil().max(1.0);
+        let rate = motion.fps * finer;
+        let frames = (motion.qpos.len() - 1) * finer as usize + 1;
         let duration = motion.duration();
+        let times = || (0..frames).map(|f| (f as f64 / rate).min(duration));
+        let contact = |time| {
+            let bodies = 0..motion.contact_bodies.len();
+            bodies.map(|c| motion.sample_contact(c, time)).collect()
+        };
         Ok(Reference {
             name: motion.name.clone(),
-            fps: motion.fps,
+            rate,
             loop_mode: motion.loop_mode,
             duration,
-            frames: (0..motion.qpos.len())
-                .map(|f| link_states(motion, skeleton, stage, f))
-                .collect(),
-            contacts: motion.tracks.contact.clone(),
+            frames: times().map(|t| link_states(motion, stage, t)).collect(),
+            contacts: times().map(contact).collect(),
             cycle: motion.cycle,
             masses: Masses::new(&stage.character),
             contact_links: motion
@@ -105,7 +115,7 @@ impl Reference {
     /// one holds its last frame.
     pub fn sample(&self, time: f64, sample: &mut Sample) {
         let (cycle, within) = self.split(time);
-        let at = within * self.fps;
+        let at = within * self.rate;
         let last = self.frames.len() - 1;
         let frame = (at.floor() as usize).min(last - 1);
         let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
@@ -137,18 +147,13 @@ impl Reference {
     }
 }
 
-fn link_states(
-    motion: &Motion,
-    skeleton: &Skeleton,
-    stage: &Stage,
-    frame: usize,
-) -> Vec<LinkState> {
-    let twists = skeleton.twists(&motion.qpos[frame], &motion.qvel[frame]);
-    let poses = &motion.bodies[frame];
-    stage
-        .character
-        .links
-        .iter()
+fn link_states(motion: &Motion, stage: &Stage, time: f64) -> Vec<LinkState> {
+    let skeleton = &stage.skeleton;
+    let qpos = motion.sample_qpos(skeleton, time);
+    let poses = skeleton.forward(&qpos);
+    let twists = skeleton.twists(&qpos, &motion.sample_qvel(time));
+    let links = stage.character.links.iter();
+    links
         .map(|link| LinkState {
             pose: poses[link.body].cast(),
             linear: twists[link.body].linear.cast(),
@@ -165,7 +170,7 @@ fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {
         .lerp(&b.pose.translation.vector, blend);
     let (qa, qb) = (a.pose.rotation.coords, b.pose.rotation.coords);
     let near = if qa.dot(&qb) < 0.0 { -qb } else { qb };
-    // Frames are close: the normalised mean differs from slerp by less than single precision shows.
+    // The table's frames are close: at 12 rad/s the normalised mean is within 1e-5 rad of slerp.
     let turn = UnitQuaternion::new_normalize(nalgebra::Quaternion::from(qa.lerp(&near, blend)));
     LinkState {
         pose: Isometry3::from_parts(Translation3::from(at), turn),

@@ -16,6 +16,15 @@ pub enum Actions {
     Absolute { reach: f32 },
 }
 
+impl Actions {
+    fn size(&self) -> f64 {
+        match self {
+            Actions::Residual { scale } => f64::from(*scale),
+            Actions::Absolute { reach } => f64::from(*reach),
+        }
+    }
+}
+
 /// Weights of the reward terms; their sum is the largest reward of a step. See [`super::Terms`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -139,6 +148,18 @@ impl Setting {
             (
                 "the distance that ends an episode",
                 f64::from(self.terminations.distance),
+                positive.clone(),
+                "positive",
+            ),
+            (
+                "the reward that ends an episode",
+                f64::from(self.terminations.reward.unwrap_or(0.0)),
+                0.0..=1.0,
+                "0 to 1",
+            ),
+            (
+                "the size of an action",
+                self.actions.size(),
                 positive,
                 "positive",
             ),
