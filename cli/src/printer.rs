@@ -12,21 +12,24 @@ pub struct Printer {
     json: bool,
     quiet: bool,
     verbose: bool,
-    /// Both streams belong to a person at a terminal.
-    terminal: bool,
+    /// Results go to a person at a terminal.
+    shown: bool,
+    /// Talk does.
+    heard: bool,
     color: bool,
 }
 
 impl Printer {
     pub fn new(talk: &Talk) -> Self {
-        let terminal = stdout().is_terminal() && stderr().is_terminal();
+        let heard = stderr().is_terminal();
         let no_color = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
         Self {
             json: talk.json,
             quiet: talk.quiet,
             verbose: talk.verbose,
-            terminal,
-            color: stderr().is_terminal() && !no_color,
+            shown: stdout().is_terminal(),
+            heard,
+            color: heard && !no_color,
         }
     }
 
@@ -61,7 +64,7 @@ impl Printer {
 
     /// What is going on; for people at a terminal, or whoever asks for it.
     pub fn note(&self, text: impl AsRef<str>) {
-        if !self.quiet && (self.terminal || self.verbose) {
+        if !self.quiet && (self.heard || self.verbose) {
             self.talk(text.as_ref());
         }
     }
@@ -96,8 +99,7 @@ impl Printer {
 
     /// A progress bar on a terminal, an invisible one elsewhere.
     pub fn progress(&self, length: u64, template: &str) -> ProgressBar {
-        let visible = self.terminal && !self.quiet && !self.json;
-        let target = if visible {
+        let target = if self.shows_progress() {
             ProgressDrawTarget::stderr_with_hz(8)
         } else {
             ProgressDrawTarget::hidden()
@@ -106,6 +108,11 @@ impl Printer {
             .unwrap_or_else(|_| ProgressStyle::default_bar())
             .progress_chars("━╸─");
         ProgressBar::with_draw_target(Some(length), target).with_style(style)
+    }
+
+    /// JSON lines and a bar never share a terminal.
+    fn shows_progress(&self) -> bool {
+        self.heard && !self.quiet && !(self.json && self.shown)
     }
 
     /// Ends the command: says what went wrong, if anything, and gives the exit code.
@@ -130,5 +137,38 @@ impl Printer {
         } else {
             text.to_string()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_is_for_who_watches_standard_error() {
+        let printer = |json, shown, heard| Printer {
+            json,
+            quiet: false,
+            verbose: false,
+            shown,
+            heard,
+            color: false,
+        };
+        assert!(printer(false, true, true).shows_progress());
+        assert!(printer(false, false, true).shows_progress(), "> results");
+        assert!(
+            printer(true, false, true).shows_progress(),
+            "--json > lines"
+        );
+        assert!(
+            !printer(true, true, true).shows_progress(),
+            "lines on the terminal"
+        );
+        assert!(!printer(false, true, false).shows_progress(), "2> log");
+        let quiet = Printer {
+            quiet: true,
+            ..printer(false, true, true)
+        };
+        assert!(!quiet.shows_progress());
     }
 }
