@@ -1,11 +1,13 @@
 //! Training runs as the verbs use them.
 
+use crate::args::positive;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::evaluate::{self, Evaluation, Options};
-use mimic::learn::{LearnError, Performer, Run, RunError, TrainError};
+use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
+use mimic::motion::MotionError;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -85,11 +87,14 @@ pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
     ))
 }
 
-/// Whose fault a failed run is.
+/// Whose fault a failed run is: a file that can't be written is the work's, one that can't be read the user's.
 pub fn failure(error: RunError) -> Failure {
     match error {
-        RunError::Io { .. } => Failure::work(error),
         RunError::Learn(error) | RunError::Train(TrainError::Learn(error)) => learn_failure(error),
+        RunError::Io { action: "read", .. } => Failure::user(error),
+        RunError::Io { .. }
+        | RunError::File(FileError::Io { verb: "write", .. })
+        | RunError::Motion(MotionError::Write { .. }) => Failure::work(error),
         error => Failure::user(error),
     }
 }
@@ -97,8 +102,18 @@ pub fn failure(error: RunError) -> Failure {
 /// A wrong setting is the user's; numbers that ran away are the work's.
 pub fn learn_failure(error: LearnError) -> Failure {
     match error {
-        LearnError::Observation { .. } | LearnError::Diverged { .. } => Failure::work(error),
+        LearnError::Observation { .. }
+        | LearnError::NotFinite { .. }
+        | LearnError::Diverged { .. } => Failure::work(error),
         error => Failure::user(error),
+    }
+}
+
+/// A positive number of `unit`, up to `most`: clocks and memory end somewhere.
+pub fn at_most(text: &str, most: f64, unit: &str) -> Result<f64, String> {
+    match positive(text)? {
+        number if number <= most => Ok(number),
+        _ => Err(format!("at most {most} {unit} are possible")),
     }
 }
 
@@ -108,4 +123,52 @@ pub fn use_threads(threads: Option<usize>) -> Outcome<usize> {
     pool.build_global()
         .map_err(|e| Failure::work(format!("cannot start threads: {e}")))?;
     Ok(rayon::current_num_threads())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn code(failure: &Failure) -> u8 {
+        match failure {
+            Failure::ClosedPipe => 0,
+            Failure::Work(_) => 1,
+            Failure::User(_) => 2,
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_or_ran_away_is_failed_work() {
+        let io = |verb| FileError::Io {
+            verb,
+            path: "run/policy.safetensors".into(),
+            source: std::io::ErrorKind::PermissionDenied.into(),
+        };
+        assert_eq!(code(&failure(io("write").into())), 1);
+        assert_eq!(code(&failure(io("read").into())), 2);
+        let motion = MotionError::Write {
+            path: "run/reference-0.motion".into(),
+            message: "no space".into(),
+        };
+        assert_eq!(code(&failure(motion.into())), 1);
+        let wild = LearnError::NotFinite {
+            what: "rewards",
+            sample: 3,
+        };
+        assert_eq!(code(&failure(TrainError::Learn(wild).into())), 1);
+        let setting = LearnError::Setting {
+            name: "gamma",
+            value: "3".into(),
+            range: "0..=1",
+        };
+        assert_eq!(code(&learn_failure(setting)), 2);
+    }
+
+    #[test]
+    fn numbers_have_an_upper_bound() {
+        assert_eq!(at_most("1e6", 1e6, "minutes"), Ok(1e6));
+        for wrong in ["1e20", "inf", "nan", "0", "-1", "long"] {
+            assert!(at_most(wrong, 1e6, "minutes").is_err(), "{wrong}");
+        }
+    }
 }

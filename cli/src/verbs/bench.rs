@@ -1,6 +1,6 @@
 //! `mimic bench`: how fast this machine is at every stage of the work.
 
-use crate::args::{at_least_one, positive};
+use crate::args::at_least_one;
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::runs;
@@ -26,6 +26,9 @@ Examples:
 /// The same clip on every machine.
 const CLIP: &[u8] = include_bytes!("../../../clips/walk.glb");
 
+/// Longest measurement: an hour is longer than any needs.
+const MOST_SECONDS: f64 = 3600.0;
+
 /// Length of an environment's episode, seconds.
 const HORIZON_S: f64 = 20.0;
 
@@ -34,11 +37,15 @@ const HORIZON_S: f64 = 20.0;
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Seconds for each measurement
-    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     seconds: f64,
     /// Threads [default: all]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     threads: Option<usize>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    runs::at_most(text, MOST_SECONDS, "seconds")
 }
 
 #[derive(Serialize)]
@@ -75,11 +82,11 @@ impl Args {
         say("retargeting");
         let retarget_frames_per_second = bench.retarget()?;
         say("the reference");
-        let reference_frames_per_second = bench.reference();
+        let reference_frames_per_second = bench.reference()?;
         say("physics");
-        let physics_steps_per_second = bench.physics();
+        let physics_steps_per_second = bench.physics()?;
         say("the environment");
-        let env_steps_per_second = bench.environment();
+        let env_steps_per_second = bench.environment()?;
         say("training");
         let train_samples_per_second = bench.train()?;
         let report = Report {
@@ -100,7 +107,7 @@ impl Args {
 
 /// A built-in input that fails is our own fault.
 fn broken(error: impl std::fmt::Display) -> Failure {
-    Failure::work(format!("cannot set up the measurement: {error}"))
+    Failure::work(format!("cannot measure: {error}"))
 }
 
 impl Bench {
@@ -131,23 +138,26 @@ impl Bench {
         let options = retarget::Options::default();
         let once = || retarget::retarget(&self.clip, &self.stage.skeleton, &options);
         once().map_err(broken)?;
-        Ok(self.frames_per_second(|| once().map_or(0, |done| done.motion.qpos.len())))
+        self.count(|| {
+            let done = once().map_err(broken)?;
+            Ok(done.motion.qpos.len() as u64)
+        })
     }
 
-    fn reference(&self) -> f64 {
+    fn reference(&self) -> Outcome<f64> {
         let mut sample = self.reference.blank();
         let mut time = 0.0;
-        self.frames_per_second(|| {
+        self.count(|| {
             for _ in 0..1000 {
                 time = (time + 0.013) % HORIZON_S;
                 self.reference.sample(time, &mut sample);
             }
-            1000
+            Ok(1000)
         })
     }
 
     /// Integrations of joints and contacts, at `physics_hz`, of a character per thread that falls to the ground.
-    fn physics(&self) -> f64 {
+    fn physics(&self) -> Outcome<f64> {
         let settings = self.plan.task.physics;
         let mut first = self.reference.blank();
         self.reference.sample(0.0, &mut first);
@@ -156,18 +166,16 @@ impl Bench {
             world.reset(&first.links);
             self.count(|| {
                 for _ in 0..settings.control_hz as usize {
-                    if world.step().is_err() {
-                        break;
-                    }
+                    world.step().map_err(broken)?;
                 }
                 world.reset(&first.links);
-                settings.physics_hz() as u64
+                Ok(settings.physics_hz() as u64)
             })
         })
     }
 
     /// Control steps with observation, reward and reference, without a network.
-    fn environment(&self) -> f64 {
+    fn environment(&self) -> Outcome<f64> {
         self.on_all_threads(|| {
             let mut env = Imitate::new(self.stage.clone(), self.reference.clone(), &self.plan.task);
             let action = vec![0.0; env.action_size()];
@@ -178,7 +186,7 @@ impl Bench {
                 if env.step(&action).outcome != mimic::task::Outcome::Running {
                     env.reset(0.0);
                 }
-                1
+                Ok(1)
             })
         })
     }
@@ -196,21 +204,17 @@ impl Bench {
         Ok((trainer.samples() - before) as f64 / start.elapsed().as_secs_f64())
     }
 
-    fn frames_per_second(&self, mut work: impl FnMut() -> usize) -> f64 {
-        self.count(|| work() as u64)
-    }
-
     /// Units of `work` per second, repeated until the time is up.
-    fn count(&self, mut work: impl FnMut() -> u64) -> f64 {
+    fn count(&self, mut work: impl FnMut() -> Outcome<u64>) -> Outcome<f64> {
         let start = Instant::now();
         let mut done = 0;
         while start.elapsed() < self.time {
-            done += work();
+            done += work()?;
         }
-        done as f64 / start.elapsed().as_secs_f64()
+        Ok(done as f64 / start.elapsed().as_secs_f64())
     }
 
-    fn on_all_threads(&self, work: impl Fn() -> f64 + Sync) -> f64 {
+    fn on_all_threads(&self, work: impl Fn() -> Outcome<f64> + Sync) -> Outcome<f64> {
         (0..self.threads)
             .into_par_iter()
             .with_max_len(1)
