@@ -5,11 +5,26 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
+use mimic::clip::LoopMode;
 use mimic::evaluate::{self, Evaluation, Options};
 use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
 use mimic::motion::MotionError;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+
+/// What a run keeps of its evaluation with the default options.
+pub const EVALUATION: &str = "eval.json";
+
+/// How well a run performs one of its motions.
+#[derive(Serialize)]
+pub struct Measured {
+    pub motion: String,
+    /// Length of an episode from the first frame.
+    seconds: f64,
+    #[serde(flatten)]
+    pub evaluation: Evaluation,
+}
 
 /// Opens the run that `wanted` means; left out, the newest.
 pub fn open(wanted: Option<&Path>) -> Outcome<Run> {
@@ -27,13 +42,8 @@ pub fn free_folder(name: &str) -> PathBuf {
         .unwrap_or_else(|| runs.join(name))
 }
 
-/// Evaluates every motion of a run and keeps the result as its `eval.json`. One motion gives its fields, several
-/// give a list.
-pub fn evaluate(
-    run: &Run,
-    options: &Options,
-    printer: &Printer,
-) -> Outcome<Vec<(String, Evaluation)>> {
+/// Evaluates every motion of a run.
+pub fn evaluate(run: &Run, options: &Options, printer: &Printer) -> Outcome<Vec<Measured>> {
     let performer = run.performer().map_err(failure)?;
     let mut results = Vec::new();
     for (which, motion) in run.motions().iter().enumerate() {
@@ -41,25 +51,35 @@ pub fn evaluate(
             "evaluating `{}` from {} phases",
             motion.name, options.episodes
         ));
-        let evaluation = evaluate::evaluate(&performer, which, options).map_err(learn_failure)?;
-        results.push((motion.name.clone(), evaluation));
+        results.push(Measured {
+            motion: motion.name.clone(),
+            seconds: match motion.loop_mode {
+                LoopMode::Wrap => options.seconds,
+                LoopMode::Clamp => motion.duration(),
+            },
+            evaluation: evaluate::evaluate(&performer, which, options).map_err(learn_failure)?,
+        });
     }
-    let text = serde_json::to_string_pretty(&evaluation_json(&results))
-        .map_err(|e| Failure::work(format!("cannot write the evaluation as JSON: {e}")))?;
-    run.write("eval.json", &(text + "\n")).map_err(failure)?;
     Ok(results)
 }
 
-pub fn evaluation_json(results: &[(String, Evaluation)]) -> Value {
-    let object = |(name, evaluation): &(String, Evaluation)| {
-        let mut object = json!(evaluation);
-        object["motion"] = json!(name);
-        object
-    };
+/// One motion gives its fields, several give a list.
+pub fn evaluation_json(results: &[Measured]) -> Value {
     match results {
-        [one] => object(one),
-        many => json!({ "motions": many.iter().map(object).collect::<Vec<_>>() }),
+        [one] => json!(one),
+        many => json!({ "motions": many }),
     }
+}
+
+/// An evaluation as a file.
+pub fn evaluation_text(results: &[Measured]) -> String {
+    format!("{:#}\n", evaluation_json(results))
+}
+
+/// Keeps an evaluation with the default options as that of the run.
+pub fn keep(run: &Run, results: &[Measured]) -> Outcome {
+    run.write(EVALUATION, &evaluation_text(results))
+        .map_err(failure)
 }
 
 /// The agent's performance of reference number `which` from its first frame.

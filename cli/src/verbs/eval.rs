@@ -1,17 +1,24 @@
 //! `mimic eval`: how well an agent performs what it learned.
 
-use crate::args::{at_least_one, positive};
-use crate::failure::Outcome;
+use crate::args::at_least_one;
+use crate::failure::{Failure, Outcome};
+use crate::output;
 use crate::printer::Printer;
-use crate::runs;
-use mimic::evaluate::{Evaluation, Options};
-use std::path::PathBuf;
+use crate::runs::{self, Measured};
+use mimic::evaluate::Options;
+use mimic::learn::Run;
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
   mimic eval                        the newest run
-  mimic eval runs/kick --episodes 64
-  mimic eval kick --json            the same fields as in runs/kick/eval.json";
+  mimic eval runs/kick --episodes 64 --out kick-64.json
+  mimic eval kick --json            the same fields as in runs/kick/eval.json
+
+A run's own eval.json is written with the default episodes and seconds alone, so that runs can be compared by it.";
+
+/// Every frame of every episode is held in memory until all are measured.
+const MOST_SECONDS: f64 = 3600.0;
 
 /// Measure how well an agent performs: survival, tracking errors, contacts, momentum
 #[derive(clap::Args)]
@@ -23,11 +30,18 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = Options::default().episodes, value_parser = at_least_one)]
     episodes: usize,
     /// Length of an episode of a looping motion; one that ends is played to its end
-    #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds)]
     seconds: f64,
     /// Threads [default: all]; the result is the same at any number
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
     threads: Option<usize>,
+    /// Write the result to this file, as JSON [default: the run's eval.json, with default episodes and seconds]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    runs::at_most(text, MOST_SECONDS, "seconds")
 }
 
 impl Args {
@@ -38,14 +52,66 @@ impl Args {
             episodes: self.episodes,
             seconds: self.seconds,
         };
+        let out = self
+            .out
+            .as_deref()
+            .map(|out| place(out, &run))
+            .transpose()?;
         let results = runs::evaluate(&run, &options, printer)?;
-        printer.result(&runs::evaluation_json(&results), || text(&results))
+        let kept = match out {
+            Some(out) => write(&out, &results),
+            None => {
+                keep(&run, &options, &results, printer);
+                Ok(())
+            }
+        };
+        printer.result(&runs::evaluation_json(&results), || text(&results))?;
+        kept
+    }
+}
+
+/// Where `--out` puts the result: never over what the run is made of, nor over its own evaluation.
+fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
+    let path = output::result_path(Some(out), "eval", "json");
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
+    let inside = folder.is_some() && folder == run.dir().canonicalize().ok();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if inside && !name.starts_with("eval-") {
+        return Err(Failure::input(
+            &path,
+            "belongs to the run, name a file elsewhere, or one like `eval-long.json`",
+        ));
+    }
+    Ok(path)
+}
+
+fn write(path: &Path, results: &[Measured]) -> Outcome {
+    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+    }
+    output::write_whole(path, runs::evaluation_text(results).as_bytes())
+}
+
+/// A run that can't be written, such as somebody else's, can still be measured.
+fn keep(run: &Run, options: &Options, results: &[Measured], printer: &Printer) {
+    if *options != Options::default() {
+        printer.note(format!(
+            "`{}` keeps its evaluation with the default options; `--out FILE` writes this one",
+            run.dir().display()
+        ));
+    } else if let Err(failure) = runs::keep(run, results) {
+        let reason = failure.message().unwrap_or_default();
+        printer.warn(format!("{reason}; `--out FILE` writes it elsewhere"));
     }
 }
 
 /// A table per motion.
-pub fn text(results: &[(String, Evaluation)]) -> String {
-    let table = |(name, e): &(String, Evaluation)| {
+pub fn text(results: &[Measured]) -> String {
+    let table = |measured: &Measured| {
+        let (name, e) = (&measured.motion, &measured.evaluation);
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         let rows = [
             ("survival", percent(e.survival)),

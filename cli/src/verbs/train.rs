@@ -252,6 +252,7 @@ fn session(
 /// Measures and records what was learned.
 fn finish(run: &Run, printer: &Printer) -> Outcome {
     let results = runs::evaluate(run, &Options::default(), printer)?;
+    runs::keep(run, &results)?;
     let folder = run.dir().display();
     match runs::record(run, 0, REPLAY_S) {
         Ok(shown) => replay::save(&shown, &run.dir().join("replay.rrd"), run.dir())?,
