@@ -1,5 +1,6 @@
 //! `mimic train`: a policy learns to perform a motion under physics.
 
+mod preset;
 mod progress;
 mod stop;
 
@@ -12,7 +13,9 @@ use crate::runs;
 use crate::verbs::{eval, replay};
 use clap::ValueEnum;
 use mimic::evaluate::Options;
-use mimic::learn::{Plan, Run, Trainer};
+use mimic::learn::{Run, Trainer};
+use mimic::task::TaskError;
+use preset::Preset;
 use progress::Progress;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -43,8 +46,8 @@ pub struct Args {
     /// What is learned
     #[arg(long, value_enum, default_value_t)]
     task: Task,
-    /// Settings to start from: `default`, or a JSON file with a plan as in a run's config.json
-    #[arg(long, value_name = "NAME|FILE", default_value = "default")]
+    /// Settings to start from: `default`, those of a run, or a JSON file with a plan as in a run's config.json
+    #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
     preset: String,
     /// Samples to learn from, e.g. 5M or 800k [default: as the preset says]
     #[arg(long, value_name = "N", value_parser = count)]
@@ -95,7 +98,10 @@ impl Args {
             Some(run) => runs::open(Some(run))?,
             None => self.create(library, printer)?,
         };
-        let mut trainer = run.trainer().map_err(runs::failure)?;
+        let config = run.dir().join(locate::RUN_CONFIG);
+        let mut trainer = run
+            .trainer()
+            .map_err(|e| preset::failure(Some(&config), e))?;
         let folder = run.dir().display().to_string();
         if trainer.is_done() {
             let samples = trainer.samples();
@@ -123,7 +129,7 @@ impl Args {
     /// Everything a run is made of is read and checked before its folder appears.
     fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
         let Task::Imitate = self.task;
-        let plan = self.plan()?;
+        let preset = self.preset()?;
         let preparations = self.preparations(library)?;
         let folder = self.folder(&preparations, printer)?;
         let mut motions = Vec::new();
@@ -138,10 +144,15 @@ impl Args {
             motion
                 .check_skeleton(skeleton)
                 .map_err(|e| Failure::input(&preparation.file, e))?;
+            let frames = motion.qpos.len();
+            if frames < 2 {
+                let short = TaskError::TooShort { frames };
+                return Err(Failure::input(&preparation.file, short));
+            }
             motions.push(motion);
         }
         let skeleton = skeleton.ok_or_else(|| Failure::user("no motion to learn"))?;
-        Run::create(&folder, plan, skeleton, motions).map_err(runs::failure)
+        Run::create(&folder, preset.plan.clone(), skeleton, motions).map_err(|e| preset.failure(e))
     }
 
     fn preparations(&self, library: &Path) -> Outcome<Vec<Preparation>> {
@@ -175,7 +186,8 @@ impl Args {
             [first, _, _, ..] => format!("{first}-and-{}-more", names.len() - 1),
             few => few.join("-and-"),
         };
-        let folder = runs::free_folder(&crate::output::file_name(&name));
+        let name = crate::output::file_name(&name);
+        let folder = runs::free_folder(&name);
         if folder
             .file_name()
             .is_some_and(|taken| taken != name.as_str())
@@ -188,27 +200,13 @@ impl Args {
         Ok(folder)
     }
 
-    fn plan(&self) -> Outcome<Plan> {
-        let mut plan = preset(&self.preset)?;
+    fn preset(&self) -> Outcome<Preset> {
+        let mut preset = Preset::load(&self.preset)?;
+        let plan = &mut preset.plan;
         plan.samples = self.samples.unwrap_or(plan.samples);
         plan.seed = self.seed.unwrap_or(plan.seed);
-        Ok(plan)
+        Ok(preset)
     }
-}
-
-fn preset(name: &str) -> Outcome<Plan> {
-    if name == "default" {
-        return Ok(Plan::default());
-    }
-    let path = Path::new(name);
-    if !path.is_file() {
-        return Err(Failure::user(format!(
-            "no preset `{name}`, there is `default`, or give a JSON file with a plan"
-        )));
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, e))?;
-    serde_json::from_str(&text)
-        .map_err(|e| Failure::input(path, format!("not a training plan: {e}")))
 }
 
 /// Learns until the samples or the time are used up, or somebody wants to stop. Checkpoints stand between rounds,
