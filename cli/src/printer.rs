@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
 
+#[derive(Clone, Copy)]
 pub struct Printer {
     json: bool,
     quiet: bool,
@@ -65,6 +66,13 @@ impl Printer {
     /// What is going on; for people at a terminal, or whoever asks for it.
     pub fn note(&self, text: impl AsRef<str>) {
         if !self.quiet && (self.heard || self.verbose) {
+            self.talk(text.as_ref());
+        }
+    }
+
+    /// What has to be known also where nobody watches.
+    pub fn say(&self, text: impl AsRef<str>) {
+        if !self.quiet {
             self.talk(text.as_ref());
         }
     }

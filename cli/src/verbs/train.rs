@@ -1,18 +1,17 @@
 //! `mimic train`: a policy learns to perform a motion under physics.
 
+mod finish;
 mod preset;
 mod progress;
 mod stop;
 
-use crate::args::{ImportArgs, RetargetArgs, at_least_one, positive};
+use crate::args::{ImportArgs, RetargetArgs, at_least_one};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
-use crate::verbs::{eval, replay};
 use clap::ValueEnum;
-use mimic::evaluate::Options;
 use mimic::learn::{Run, Trainer};
 use mimic::task::TaskError;
 use preset::Preset;
@@ -33,8 +32,8 @@ The run folder holds config.json, metrics.jsonl, checkpoint and policy, at the e
 A finished run is never overwritten: the next run of the same clip is runs/kick-2. Ctrl-C ends the round that is
 under way, saves, and stops; a second Ctrl-C stops at once, at the last checkpoint.";
 
-/// Seconds of a looping motion in the recording of a finished run.
-const REPLAY_S: f64 = 10.0;
+/// Two years: longer than anybody trains, and within what clocks can count.
+const MOST_MINUTES: f64 = 1e6;
 
 /// Train a policy that performs a motion under physics
 #[derive(clap::Args)]
@@ -53,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = count)]
     samples: Option<u64>,
     /// Stop after this many minutes, if the samples last longer
-    #[arg(long, value_name = "MIN", value_parser = positive)]
+    #[arg(long, value_name = "MIN", value_parser = minutes)]
     minutes: Option<f64>,
     /// Seed of all random numbers; the same seed gives the same bits [default: as the preset says]
     #[arg(long, value_name = "N")]
@@ -102,27 +101,22 @@ impl Args {
         let mut trainer = run
             .trainer()
             .map_err(|e| preset::failure(Some(&config), e))?;
-        let folder = run.dir().display().to_string();
         if trainer.is_done() {
-            let samples = trainer.samples();
-            return Err(Failure::user(format!(
-                "`{folder}` is finished, it has learned from all its {samples} samples"
-            )));
+            return finish::make_up(&run, &trainer, printer);
         }
         printer.note(format!(
-            "training `{folder}` on {threads} threads; Ctrl-C saves and stops"
+            "training `{}` on {threads} threads; Ctrl-C saves and stops",
+            run.dir().display()
         ));
         let minutes = self
             .minutes
             .map(|minutes| Duration::from_secs_f64(60.0 * minutes));
         match session(&run, &mut trainer, minutes, printer)? {
             End::Interrupted => {
-                printer.note(format!(
-                    "stopped; go on with `mimic train --resume {folder}`"
-                ));
+                printer.say(farewell(&run));
                 Ok(())
             }
-            End::OutOfTime | End::Done => finish(&run, printer),
+            End::OutOfTime | End::Done => finish::finish(&run, printer),
         }
     }
 
@@ -209,6 +203,24 @@ impl Args {
     }
 }
 
+/// What was typed to run us; from a fresh clone that isn't `mimic`.
+fn program() -> String {
+    let program = std::env::args_os().next();
+    program.map_or_else(
+        || "mimic".into(),
+        |program| program.to_string_lossy().into_owned(),
+    )
+}
+
+/// The last word of a run that somebody stopped.
+fn farewell(run: &Run) -> String {
+    format!(
+        "stopped; go on with `{} train --resume {}`",
+        program(),
+        run.dir().display()
+    )
+}
+
 /// Learns until the samples or the time are used up, or somebody wants to stop. Checkpoints stand between rounds,
 /// where a run resumes to the same bits.
 fn session(
@@ -217,50 +229,46 @@ fn session(
     time: Option<Duration>,
     printer: &Printer,
 ) -> Outcome<End> {
-    let stop = Stop::on_ctrl_c()?;
     let begun = Instant::now();
     let mut progress = Progress::new(run, trainer, printer);
+    let stop = Stop::on_ctrl_c({
+        let (bar, printer, text) = (progress.bar(), *printer, farewell(run));
+        move || {
+            bar.finish_and_clear();
+            printer.say(&text);
+        }
+    })?;
     let end = loop {
         let metrics = trainer.iterate().map_err(runs::learn_failure)?;
         let line = progress.line(&metrics);
         run.log(&line).map_err(runs::failure)?;
-        progress.show(&metrics, &line, printer)?;
-        if trainer.is_done() {
-            break End::Done;
-        }
+        progress.show(&metrics, line, printer)?;
         if stop.is_wanted() {
             progress.say("ending this round");
         }
-        if !trainer.is_between_rounds() {
+        if !trainer.is_done() && !trainer.is_between_rounds() {
             continue;
         }
-        run.save(trainer).map_err(runs::failure)?;
+        finish::save(run, trainer)?;
         if stop.is_wanted() {
             break End::Interrupted;
+        }
+        if trainer.is_done() {
+            break End::Done;
         }
         if time.is_some_and(|time| begun.elapsed() >= time) {
             break End::OutOfTime;
         }
     };
-    progress.end();
-    run.save(trainer).map_err(runs::failure)?;
-    Ok(end)
+    Ok(if stop.release() {
+        End::Interrupted
+    } else {
+        end
+    })
 }
 
-/// Measures and records what was learned.
-fn finish(run: &Run, printer: &Printer) -> Outcome {
-    let results = runs::evaluate(run, &Options::default(), printer)?;
-    runs::keep(run, &results)?;
-    let folder = run.dir().display();
-    match runs::record(run, 0, REPLAY_S) {
-        Ok(shown) => replay::save(&shown, &run.dir().join("replay.rrd"), run.dir())?,
-        Err(failure) => printer.warn(failure.message().unwrap_or_default()),
-    }
-    if !printer.is_json() {
-        printer.text(&format!("{folder}\n{}", eval::text(&results)))?;
-    }
-    printer.note(format!("watch it with `mimic replay {folder} --rerun`"));
-    Ok(())
+fn minutes(text: &str) -> Result<f64, String> {
+    runs::at_most(text, MOST_MINUTES, "minutes")
 }
 
 /// A whole number, with k for thousands and M for millions.

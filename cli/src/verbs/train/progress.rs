@@ -9,6 +9,7 @@ use std::time::Instant;
 
 pub struct Progress {
     bar: ProgressBar,
+    folder: String,
     /// Seconds that earlier sessions of this run took.
     before: f64,
     begun: Instant,
@@ -20,13 +21,14 @@ impl Progress {
     pub fn new(run: &Run, trainer: &Trainer, printer: &Printer) -> Self {
         let bar = printer.progress(
             trainer.plan().samples,
-            "{bar:24} {percent:>3} %  {msg}  {eta} left",
+            "{bar:16} {percent:>3} %  {msg}  {eta} left",
         );
         bar.set_position(trainer.samples());
         bar.reset_eta();
         let now = Instant::now();
         Self {
             bar,
+            folder: run.dir().display().to_string(),
             before: seconds_before(run),
             begun: now,
             last: now,
@@ -46,17 +48,19 @@ impl Progress {
         line
     }
 
-    pub fn show(&self, metrics: &Metrics, line: &Value, printer: &Printer) -> Outcome {
+    /// A printed line says also which run it belongs to; the log doesn't, for a run can be moved.
+    pub fn show(&self, metrics: &Metrics, mut line: Value, printer: &Printer) -> Outcome {
         let rate = line["samples_per_second"].as_f64().unwrap_or_default();
         let message = format!(
-            "{:.1}k samples/s  return {}  episode {} s",
+            "{:.1}k samples/s  normalised return {}  episode {} s",
             rate / 1e3,
             number(metrics.normalized_return, 3),
             number(metrics.episode_length, 1),
         );
         self.bar.set_position(metrics.samples);
         if printer.is_json() {
-            printer.json_line(line)?;
+            line["run"] = json!(self.folder);
+            printer.json_line(&line)?;
         } else if self.bar.is_hidden() {
             printer.detail(format!("{} samples  {message}", metrics.samples));
         }
@@ -68,7 +72,13 @@ impl Progress {
         self.bar.set_message(text);
     }
 
-    pub fn end(&self) {
+    pub fn bar(&self) -> ProgressBar {
+        self.bar.clone()
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
 }

@@ -1,0 +1,94 @@
+//! What follows the learning: how well it went, and how to look at it.
+
+use super::program;
+use crate::failure::{Failure, Outcome};
+use crate::printer::Printer;
+use crate::runs;
+use crate::verbs::{eval, replay};
+use crate::viewer::{self, Viewer};
+use mimic::evaluate::Options;
+use mimic::learn::{Run, Trainer};
+use std::path::{Path, PathBuf};
+
+/// Seconds of a looping motion in the recording of a finished run.
+const REPLAY_S: f64 = 10.0;
+
+fn recording(run: &Run) -> PathBuf {
+    run.dir().join("replay.rrd")
+}
+
+fn evaluation(run: &Run) -> PathBuf {
+    run.dir().join(runs::EVALUATION)
+}
+
+/// Saves what was learned. Results of an older policy don't stay beside a newer one, so whoever finds some knows
+/// that the run was finished.
+pub fn save(run: &Run, trainer: &Trainer) -> Outcome {
+    for outdated in [evaluation(run), recording(run)] {
+        std::fs::remove_file(outdated).ok();
+    }
+    run.save(trainer).map_err(runs::failure)
+}
+
+/// Measures and records what was learned.
+pub fn finish(run: &Run, printer: &Printer) -> Outcome {
+    let results = runs::evaluate(run, &Options::default(), printer)?;
+    runs::keep(run, &results)?;
+    let recorded = record(run, printer)?;
+    if printer.is_json() {
+        return Ok(());
+    }
+    let folder = run.dir().display();
+    let look = match recorded {
+        Some(file) => how_to_look(run.dir(), &file),
+        None => String::new(),
+    };
+    printer.text(&format!("{folder}\n{}{look}", eval::text(&results)))
+}
+
+/// A run that has learned all it will: what a killed session left out is made up for.
+pub fn make_up(run: &Run, trainer: &Trainer, printer: &Printer) -> Outcome {
+    let folder = run.dir().display();
+    if evaluation(run).exists() && recording(run).exists() {
+        let (samples, mimic) = (trainer.samples(), program());
+        return Err(Failure::user(format!(
+            "`{folder}` is finished, it has learned from all its {samples} samples: \
+             measure it with `{mimic} eval {folder}`, watch it with `{mimic} replay {folder} --rerun`"
+        )));
+    }
+    printer.note(format!(
+        "`{folder}` has learned from all its samples, what is missing is its evaluation or recording"
+    ));
+    // The checkpoint is written first, so the policy may be that of the round before.
+    save(run, trainer)?;
+    finish(run, printer)
+}
+
+/// The recording's file; `None` where the agent has nothing to show.
+fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
+    match runs::record(run, 0, REPLAY_S) {
+        Ok(shown) => {
+            let file = recording(run);
+            replay::save(&shown, &file, run.dir())?;
+            Ok(Some(file))
+        }
+        Err(failure) => {
+            printer.warn(failure.message().unwrap_or_default());
+            Ok(None)
+        }
+    }
+}
+
+fn how_to_look(folder: &Path, recording: &Path) -> String {
+    let (folder, recording, mimic) = (folder.display(), recording.display(), program());
+    let mut text = format!(
+        "recording: {recording}\n  watch it          rerun {recording}\n  or from the run   {mimic} replay {folder} --rerun\n"
+    );
+    if Viewer::find().is_none() {
+        text += &format!(
+            "  there is no rerun on this machine yet: {}\n",
+            viewer::install()
+        );
+    }
+    text
+}
