@@ -1,8 +1,9 @@
 //! `train`, `eval`, `replay` of a run, `bench`.
 
+mod stopping;
+
 use crate::workbench::Workbench;
 use serde_json::Value;
-use std::process::{Command, Stdio};
 
 /// A few iterations of a small network: enough to have a run, not to learn anything.
 fn with_preset() -> Workbench {
@@ -13,6 +14,22 @@ fn with_preset() -> Workbench {
     );
     bench
 }
+
+/// A run of four iterations.
+fn with_run() -> Workbench {
+    let bench = with_preset();
+    bench.mimic(&SMALL).assert().success();
+    bench
+}
+
+const SMALL: [&str; 6] = [
+    "train",
+    "sway.txt",
+    "--preset",
+    "small.json",
+    "--out",
+    "run",
+];
 
 fn lines(text: &[u8]) -> Vec<Value> {
     let text = String::from_utf8_lossy(text).into_owned();
@@ -38,7 +55,14 @@ fn a_run_is_trained_measured_and_recorded() {
     let printed = lines(&output.get_output().stdout);
     assert_eq!(printed.len(), 4, "512 samples in iterations of 128");
     let logged = std::fs::read(bench.path("runs/sway/metrics.jsonl")).unwrap_or_default();
-    assert_eq!(printed, lines(&logged));
+    let mut named = lines(&logged);
+    for line in &mut named {
+        line["run"] = "runs/sway".into();
+    }
+    assert_eq!(
+        printed, named,
+        "the log knows no place, for a run can be moved"
+    );
     for field in [
         "iteration",
         "samples",
@@ -90,8 +114,6 @@ fn a_run_is_trained_measured_and_recorded() {
 
     let said = bench.complaint(&["train", "sway.txt", "--out", "runs/sway"], 2);
     assert!(said.contains("holds a run already"), "{said}");
-    let said = bench.complaint(&["train", "--resume", "sway"], 2);
-    assert!(said.contains("finished"), "{said}");
     bench.mimic(&line).assert().success();
     assert!(
         bench.path("runs/sway-2/eval.json").is_file(),
@@ -100,96 +122,154 @@ fn a_run_is_trained_measured_and_recorded() {
 }
 
 #[test]
-fn a_run_that_is_stopped_goes_on_to_the_same_numbers() {
+fn the_end_says_how_to_look_at_the_result() {
     let bench = with_preset();
-    let train = |out: &str| {
-        [
-            "train",
-            "sway.txt",
-            "--preset",
-            "small.json",
-            "--samples",
-            "5120",
-            "--out",
-            out,
-        ]
-        .map(String::from)
-    };
-    bench
-        .mimic(&train("whole").each_ref().map(String::as_str))
-        .assert()
-        .success();
-    let hurried: Vec<String> = train("cut")
-        .into_iter()
-        .chain(["--minutes".into(), "1e-9".into()])
-        .collect();
-    bench
-        .mimic(&hurried.iter().map(String::as_str).collect::<Vec<_>>())
-        .assert()
-        .success();
-    let read = |run: &str| {
-        lines(&std::fs::read(bench.path(run).join("metrics.jsonl")).unwrap_or_default())
-    };
-    assert_eq!(read("cut").len(), 2, "stopped after the first round");
-    bench
-        .mimic(&["train", "--resume", "cut", "--threads", "1"])
-        .assert()
-        .success();
-    let numbers = |run: &str| read(run).into_iter().map(without_clock).collect::<Vec<_>>();
-    assert_eq!(numbers("cut"), numbers("whole"));
+    let output = bench.mimic(&SMALL).assert().success();
+    let text = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+    assert!(text.starts_with("run\n"), "{text}");
+    if bench.path("run/replay.rrd").exists() {
+        assert!(text.contains("rerun run/replay.rrd"), "{text}");
+        assert!(text.contains("replay run --rerun"), "{text}");
+    }
 }
 
-#[cfg(unix)]
 #[test]
-fn ctrl_c_saves_and_stops() {
-    let bench = with_preset();
-    let mut child = Command::new(assert_cmd::cargo::cargo_bin("mimic"))
-        .args([
-            "train",
-            "sway.txt",
-            "--preset",
-            "small.json",
-            "--samples",
-            "1000M",
-            "--out",
-            "run",
-        ])
-        .current_dir(bench.path("."))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts");
-    let checkpoint = bench.path("run/checkpoint.safetensors");
-    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(60);
-    while !checkpoint.exists() && std::time::Instant::now() < deadline {
-        std::thread::sleep(std::time::Duration::from_millis(50));
+fn other_options_leave_the_evaluation_of_the_run_alone() {
+    let bench = with_run();
+    let official = std::fs::read(bench.path("run/eval.json")).expect("it was evaluated");
+    let line = ["eval", "run", "--episodes", "2", "--seconds", "2"];
+    let short = bench.json(&line);
+    assert_eq!(short["seconds"], 2.0, "the clip loops");
+    let kept = std::fs::read(bench.path("run/eval.json")).expect("it is still there");
+    assert_eq!(kept, official);
+
+    let to = |out| [&line[..], &["--out", out]].concat();
+    assert_eq!(bench.json(&to("made/short.json")), short);
+    let written = std::fs::read(bench.path("made/short.json")).expect("it was asked for");
+    assert_eq!(serde_json::from_slice::<Value>(&written).ok(), Some(short));
+    for own in ["run/", "run/config.json"] {
+        let said = bench.complaint(&to(own), 2);
+        assert!(said.contains("belongs to the run"), "{said}");
     }
-    let id = child.id().to_string();
-    Command::new("kill")
-        .args(["-INT", &id])
-        .status()
-        .expect("a signal can be sent");
-    let status = child.wait().expect("the program ends");
-    assert!(status.success());
-    assert!(checkpoint.exists());
-    let said = bench.complaint(&["train", "--resume", "nothing"], 2);
-    assert!(said.contains("no run there"), "{said}");
+    bench.json(&to("run/eval-short.json"));
+}
+
+#[test]
+fn a_run_that_cannot_be_written_is_measured_all_the_same() {
+    let bench = with_run();
+    std::fs::remove_file(bench.path("run/eval.json")).expect("it was evaluated");
+    std::fs::create_dir(bench.path("run/eval.json")).expect("a folder can be made");
+    let output = bench.mimic(&["eval", "run", "--json"]).assert().success();
+    let output = output.get_output();
+    assert_eq!(lines(&output.stdout)[0]["episodes"], 16);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("eval.json") && said.contains("--out"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_run_is_a_preset() {
+    let bench = with_run();
+    for (preset, out) in [("run/config.json", "a"), ("run", "b")] {
+        let line = ["train", "sway.txt", "--preset", preset, "--out", out];
+        bench.mimic(&line).assert().success();
+        let config = |run: &str| std::fs::read(bench.path(run).join("config.json")).ok();
+        assert_eq!(config(out), config("run"));
+    }
+    let said = bench.complaint(&["train", "sway.txt", "--preset", "absent"], 2);
+    assert!(said.contains("no preset `absent`"), "{said}");
+}
+
+#[test]
+fn a_wrong_setting_is_named_with_its_file() {
+    let bench = with_preset();
+    for (name, plan) in [
+        ("group", r#"{ "group": 0 }"#),
+        ("gamma", r#"{ "ppo": { "gamma": 3 } }"#),
+        ("samples", r#"{ "samples": 0 }"#),
+        ("horizons", r#"{ "horizons": 3 }"#),
+        (
+            "control_hz",
+            r#"{ "task": { "physics": { "control_hz": 0 } } }"#,
+        ),
+    ] {
+        bench.write("wrong.json", plan.as_bytes());
+        let said = bench.complaint(&["train", "sway.txt", "--preset", "wrong.json"], 2);
+        assert!(
+            said.contains("`wrong.json`: ") && said.contains(name),
+            "{said}"
+        );
+    }
+    assert!(!bench.path("runs").exists());
+}
+
+#[test]
+fn a_motion_of_one_frame_is_named() {
+    let bench = with_preset();
+    let whole = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
+    let mut clip: Value = serde_json::from_slice(&whole).expect("the clip is JSON");
+    if let Some(frames) = clip["Frames"].as_array_mut() {
+        frames.truncate(1);
+    }
+    bench.write("still.txt", clip.to_string().as_bytes());
+    let line = ["train", "sway.txt", "still.txt", "--quiet"];
+    let said = bench.complaint(&line, 2);
+    assert!(said.contains("still.txt"), "{said}");
+}
+
+#[test]
+fn a_first_run_is_called_the_first() {
+    let bench = with_preset();
+    std::fs::rename(bench.path("sway.txt"), bench.path("my sway.txt")).expect("a file moves");
+    let line = [
+        "train",
+        "my sway.txt",
+        "--preset",
+        "small.json",
+        "--verbose",
+    ];
+    for (run, is_second) in [("runs/my-sway", false), ("runs/my-sway-2", true)] {
+        let output = bench.mimic(&line).assert().success();
+        let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert_eq!(said.contains("there already"), is_second, "{said}");
+        assert!(bench.path(run).exists());
+    }
+}
+
+#[test]
+fn numbers_out_of_range_are_wrong_usage() {
+    let bench = with_preset();
+    for (line, remedy) in [
+        (&["train", "sway.txt", "--minutes", "1e20"][..], "at most"),
+        (&["bench", "--seconds", "1e20"], "at most"),
+        (&["eval", "--seconds", "1e20"], "at most"),
+        (&["eval", "--threads", "0"], "at least 1"),
+    ] {
+        let output = bench.mimic(line).assert().code(2);
+        let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert!(said.contains(remedy), "{said}");
+    }
+}
+
+#[test]
+fn a_run_that_cannot_be_written_is_failed_work() {
+    let bench = with_preset();
+    for blocked in ["policy.safetensors", "reference-0.motion"] {
+        std::fs::create_dir_all(bench.path("run").join(blocked)).expect("a folder can be made");
+        let said = bench.complaint(&SMALL, 1);
+        assert!(said.contains(blocked), "{said}");
+        std::fs::remove_dir_all(bench.path("run")).expect("a folder can be removed");
+    }
+    std::fs::create_dir_all(bench.path("run/skeleton.xml")).expect("a folder can be made");
+    bench.write("run/config.json", b"{}");
+    bench.complaint(&["eval", "run"], 2);
 }
 
 #[test]
 fn damaged_runs_are_named() {
-    let bench = with_preset();
-    bench
-        .mimic(&[
-            "train",
-            "sway.txt",
-            "--preset",
-            "small.json",
-            "--out",
-            "run",
-        ])
-        .assert()
-        .success();
+    let bench = with_run();
     let policy = std::fs::read(bench.path("run/policy.safetensors")).expect("the policy is there");
     bench.write("run/policy.safetensors", &policy[..policy.len() / 2]);
     let said = bench.complaint(&["eval", "run"], 2);
@@ -197,12 +277,6 @@ fn damaged_runs_are_named() {
     bench.write("run/config.json", b"{");
     let said = bench.complaint(&["eval", "run"], 2);
     assert!(said.contains("config.json"), "{said}");
-    bench.write("wrong.json", br#"{ "horizons": 3 }"#);
-    let said = bench.complaint(&["train", "sway.txt", "--preset", "wrong.json"], 2);
-    assert!(
-        said.contains("wrong.json") && said.contains("horizons"),
-        "{said}"
-    );
 }
 
 #[test]
