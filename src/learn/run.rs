@@ -247,7 +247,9 @@ impl Run {
             .append(true)
             .open(&path)
             .map_err(io("open", &path))?;
-        writeln!(file, "{line}").map_err(io("write", &path))
+        // In one piece, so that whoever reads along never finds half a line.
+        file.write_all(format!("{line}\n").as_bytes())
+            .map_err(io("write", &path))
     }
 
     /// Writes a file of the run, such as `eval.json`, replaced at once.
