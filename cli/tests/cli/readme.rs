@@ -26,7 +26,7 @@ fn arguments(command: &str) -> Option<Vec<&str>> {
     if rest.is_none() {
         let builds = [
             "cargo test --release --workspace",
-            "cargo install --path cli",
+            "cargo install --locked --path cli",
         ];
         assert!(
             builds.contains(&command),
