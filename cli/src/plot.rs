@@ -21,15 +21,6 @@ struct Line<'a> {
     values: Vec<f64>,
 }
 
-/// Names of the bodies that may touch the ground.
-pub fn contact_names(motion: &Motion) -> Vec<String> {
-    let name = |body: &usize| {
-        let name = motion.body_names.get(*body).cloned();
-        name.unwrap_or_else(|| format!("body {body}"))
-    };
-    motion.contact_bodies.iter().map(name).collect()
-}
-
 /// Contacts, centre of mass, momenta and what the ground can't supply, over time.
 pub fn tracks(motion: &Motion) -> String {
     let tracks = &motion.tracks;
@@ -40,15 +31,12 @@ pub fn tracks(motion: &Motion) -> String {
         "velocity of the centre of mass, m/s",
         &xyz(&tracks.com_velocity),
     );
+    sheet.panel("linear momentum, kg·m/s", &xyz(&tracks.linear_momentum));
     sheet.panel("angular momentum, kg·m²/s", &xyz(&tracks.angular_momentum));
-    let force = tracks
-        .root_wrench_residual
-        .iter()
-        .map(|w| w.fixed_rows::<3>(0).norm());
     let unsupported = Line {
         name: "size",
         color: COLORS[3],
-        values: force.collect(),
+        values: tracks.unsupported_force().collect(),
     };
     sheet.panel("force that no ground contact supplies, N", &[unsupported]);
     let phase = Line {
@@ -97,7 +85,7 @@ impl Sheet {
 
     /// A bar for every stretch in which a body stands on the ground.
     fn lanes(&mut self, motion: &Motion) {
-        let names = contact_names(motion);
+        let names = motion.contact_names();
         self.heading("ground contact");
         let top = self.y;
         let rows = &motion.tracks.contact;

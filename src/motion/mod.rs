@@ -8,12 +8,14 @@ mod momentum;
 mod nnls;
 mod phase;
 mod sample;
+mod summary;
 mod timeline;
 mod velocity;
 mod wrench;
 
 pub use build::Draft;
 pub use error::MotionError;
+pub use summary::{ContactShare, Extent, Summary};
 
 use crate::clip::LoopMode;
 use nalgebra::{Isometry3, Vector3, Vector6};

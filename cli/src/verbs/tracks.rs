@@ -8,7 +8,7 @@ use crate::plot;
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use mimic::clip::LoopMode;
-use mimic::motion::Motion;
+use mimic::motion::{ContactShare, Extent, Motion, Summary};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -39,20 +39,6 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Spread {
-    min: f64,
-    mean: f64,
-    max: f64,
-}
-
-#[derive(Serialize)]
-struct Contact {
-    body: String,
-    /// Part of the frames in which it stands on the ground.
-    share: f64,
-}
-
-#[derive(Serialize)]
 struct Report {
     motion: String,
     skeleton: String,
@@ -63,14 +49,8 @@ struct Report {
     loop_mode: LoopMode,
     cycle_translation_m: [f64; 3],
     cycle_heading_rad: f64,
-    com_height_m: Spread,
-    com_speed_m_s: Spread,
-    linear_momentum: Spread,
-    angular_momentum: Spread,
-    /// Force and moment that no ground contact can supply.
-    unsupported_force_n: Spread,
-    unsupported_moment_n_m: Spread,
-    contacts: Vec<Contact>,
+    #[serde(flatten)]
+    summary: Summary,
 }
 
 impl Args {
@@ -102,8 +82,6 @@ fn save(path: &Path, input: &Path, text: &str, printer: &Printer) -> Outcome {
 }
 
 fn report(motion: &Motion) -> Report {
-    let tracks = &motion.tracks;
-    let residual = &tracks.root_wrench_residual;
     Report {
         motion: motion.name.clone(),
         skeleton: motion.skeleton_name.clone(),
@@ -113,43 +91,8 @@ fn report(motion: &Motion) -> Report {
         loop_mode: motion.loop_mode,
         cycle_translation_m: motion.cycle.translation.into(),
         cycle_heading_rad: motion.cycle.heading,
-        com_height_m: spread(tracks.com.iter().map(|p| p.z)),
-        com_speed_m_s: spread(tracks.com_velocity.iter().map(|v| v.norm())),
-        linear_momentum: spread(tracks.linear_momentum.iter().map(|p| p.norm())),
-        angular_momentum: spread(tracks.angular_momentum.iter().map(|l| l.norm())),
-        unsupported_force_n: spread(residual.iter().map(|w| w.fixed_rows::<3>(0).norm())),
-        unsupported_moment_n_m: spread(residual.iter().map(|w| w.fixed_rows::<3>(3).norm())),
-        contacts: contacts(motion),
+        summary: motion.summary(),
     }
-}
-
-fn contacts(motion: &Motion) -> Vec<Contact> {
-    let rows = &motion.tracks.contact;
-    let share = |c: usize| {
-        let down = rows.iter().filter(|row| row.get(c) == Some(&true)).count();
-        down as f64 / rows.len().max(1) as f64
-    };
-    let names = plot::contact_names(motion).into_iter().enumerate();
-    names
-        .map(|(c, body)| Contact {
-            body,
-            share: share(c),
-        })
-        .collect()
-}
-
-fn spread(values: impl Iterator<Item = f64>) -> Spread {
-    let (mut count, mut sum) = (0usize, 0.0);
-    let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-    for value in values {
-        (count, sum) = (count + 1, sum + value);
-        (min, max) = (min.min(value), max.max(value));
-    }
-    if count == 0 {
-        (min, max) = (0.0, 0.0);
-    }
-    let mean = sum / count.max(1) as f64;
-    Spread { min, mean, max }
 }
 
 fn text(report: &Report) -> String {
@@ -169,17 +112,18 @@ fn text(report: &Report) -> String {
         "mean",
         "most"
     );
-    for (name, Spread { min, mean, max }) in [
-        ("height of centre of mass, m", &report.com_height_m),
-        ("speed of centre of mass, m/s", &report.com_speed_m_s),
-        ("linear momentum, kg·m/s", &report.linear_momentum),
-        ("angular momentum, kg·m²/s", &report.angular_momentum),
-        ("unsupported force, N", &report.unsupported_force_n),
-        ("unsupported moment, N·m", &report.unsupported_moment_n_m),
+    let summary = &report.summary;
+    for (name, Extent { min, mean, max }) in [
+        ("height of centre of mass, m", &summary.com_height_m),
+        ("speed of centre of mass, m/s", &summary.com_speed_m_s),
+        ("linear momentum, kg·m/s", &summary.linear_momentum),
+        ("angular momentum, kg·m²/s", &summary.angular_momentum),
+        ("unsupported force, N", &summary.unsupported_force_n),
+        ("unsupported moment, N·m", &summary.unsupported_moment_n_m),
     ] {
         writeln!(text, "{name:32} {min:9.2} {mean:9.2} {max:9.2}").ok();
     }
-    for Contact { body, share } in &report.contacts {
+    for ContactShare { body, share } in &summary.contacts {
         let name = format!("{body} on the ground");
         writeln!(text, "{name:32} {:>8.0} %", 100.0 * share).ok();
     }
@@ -206,7 +150,8 @@ fn table(motion: &Motion) -> String {
         header.extend(["x", "y", "z"].map(|axis| format!("{name}_{axis}")));
     }
     header.extend(
-        plot::contact_names(motion)
+        motion
+            .contact_names()
             .iter()
             .map(|body| format!("contact_{body}")),
     );
