@@ -1,5 +1,7 @@
 //! What kind of file some bytes are, by their content.
 
+use safetensors::SafeTensors;
+
 /// A format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
@@ -14,6 +16,9 @@ const HEAD: usize = 4096;
 
 /// The format of `bytes`, or what they seem to be and what to do about it.
 pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
+    if let Some(format) = own_format(bytes) {
+        return Err(own_refusal(&format));
+    }
     if bytes.starts_with(b"Kaydara FBX Binary") {
         return Ok(Format::Fbx);
     }
@@ -28,6 +33,31 @@ pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
         return detect_json(text);
     }
     Err(refusal(text))
+}
+
+/// What one of our own files says to be.
+fn own_format(bytes: &[u8]) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Stamp {
+        format: String,
+    }
+    // Eight bytes of length, then a JSON object: before that is sure, nothing is parsed.
+    if bytes.get(8) != Some(&b'{') {
+        return None;
+    }
+    let (_, metadata) = SafeTensors::read_metadata(bytes).ok()?;
+    let text = metadata.metadata().as_ref()?.get("mimic")?;
+    Some(serde_json::from_str::<Stamp>(text).ok()?.format)
+}
+
+fn own_refusal(format: &str) -> String {
+    let remedy = match format {
+        "clip" => "name it NAME.clip, and give it to `mimic info` or `mimic retarget`",
+        "motion" => "give it to `mimic tracks` or `mimic replay`",
+        "policy" | "checkpoint" => "give the folder of its run to `mimic eval` or `mimic replay`",
+        _ => "give an animation file",
+    };
+    format!("is a {format} of mimic's own, not an animation file; {remedy}")
 }
 
 fn detect_json(text: &[u8]) -> Result<Format, String> {
@@ -89,6 +119,30 @@ mod tests {
             detect(b"{\"Loop\":\"wrap\",\"Frames\":[]}"),
             Ok(Format::DeepMimic)
         );
+    }
+
+    #[test]
+    fn our_own_files_are_sent_where_they_belong() {
+        let file = |format: &str| {
+            let mimic = serde_json::json!({ "version": 1, "format": format }).to_string();
+            let head = serde_json::json!({ "__metadata__": { "mimic": mimic } }).to_string();
+            // A length whose bytes read ` {`, and one that is no text.
+            [0x7b20, head.len().next_multiple_of(8)].map(|length| {
+                let mut bytes = (length as u64).to_le_bytes().to_vec();
+                bytes.extend(head.as_bytes());
+                bytes.resize(8 + length, b' ');
+                bytes
+            })
+        };
+        for (format, place) in [("clip", "mimic retarget"), ("motion", "mimic tracks")] {
+            for bytes in file(format) {
+                let refused = detect(&bytes).expect_err("refused");
+                assert!(
+                    refused.contains(format) && refused.contains(place),
+                    "{refused}"
+                );
+            }
+        }
     }
 
     #[test]
