@@ -29,16 +29,21 @@ pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathB
         return Err(Failure::input(wanted, "a folder, give a file in it"));
     }
     if is_name(wanted) {
-        let with = |extension: &&str| {
-            let name = format!("{}.{extension}", wanted.display());
-            library.join(name)
-        };
-        let named = std::iter::once(library.join(wanted)).chain(extensions.iter().map(with));
-        if let Some(found) = named.into_iter().find(|path| path.is_file()) {
+        let whole = Some(library.join(wanted)).filter(|path| path.is_file());
+        if let Some(found) = whole.or_else(|| named(wanted, library, extensions)) {
             return Ok(found);
         }
     }
     Err(absent(wanted, library, extensions))
+}
+
+/// The file of the library that is called `name` but for its extension, which is in upper case on some systems.
+fn named(name: &Path, library: &Path, extensions: &[&str]) -> Option<PathBuf> {
+    let called = |path: &PathBuf| path.is_file() && path.file_stem() == name.file_name();
+    let mut files: Vec<_> = entries(library).filter(called).collect();
+    files.sort();
+    let mut wanted = extensions.iter();
+    wanted.find_map(|e| files.iter().find(|path| has_extension(path, e)).cloned())
 }
 
 /// The file that `wanted` means; left out, the newest `.newest` file here or in the library: one of our own
