@@ -150,9 +150,20 @@ pub struct RetargetArgs {
 }
 
 impl RetargetArgs {
+    /// As for import options: nothing is ignored.
+    pub fn refuse_for(&self, file: &Path, kind: &str) -> Outcome {
+        if self.skeleton.is_none() && self.map.is_none() {
+            return Ok(());
+        }
+        Err(Failure::input(
+            file,
+            format!("is {kind} already, `--skeleton` and `--map` don't apply; give the clip"),
+        ))
+    }
+
     pub fn skeleton(&self) -> Outcome<Skeleton> {
         let name = self.skeleton.as_deref().unwrap_or("humanoid");
-        Skeleton::load(name).map_err(|e| Failure::input(Path::new(name), e))
+        Skeleton::load(name).map_err(|e| Failure::skeleton(Path::new(name), e))
     }
 }
 

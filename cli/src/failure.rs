@@ -1,5 +1,7 @@
 //! What can end a command early, and the exit code it ends with.
 
+use mimic::motion::MotionError;
+use mimic::skeleton::{Skeleton, SkeletonError};
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -12,6 +14,11 @@ pub struct UserError(String);
 /// Everything was right, and the work still failed.
 #[derive(Debug)]
 pub struct WorkError(String);
+
+/// What to do about a file that the system doesn't give.
+const CHECK: &str = "check the path and its permissions";
+/// What to do about a file that the system doesn't take.
+const CHECK_ROOM: &str = "check the path, its permissions and the room there";
 
 #[derive(Debug)]
 pub enum Failure {
@@ -34,16 +41,51 @@ impl Failure {
 
     /// An input error about one file. The file is named once, also where the cause names it already.
     pub fn input(path: &Path, cause: impl Display) -> Self {
-        let cause = cause.to_string();
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let named = [format!("{}: ", path.display()), format!("{file}: ")];
-        let bare = named.iter().find_map(|name| cause.strip_prefix(name));
-        Self::user(format!("`{}`: {}", path.display(), bare.unwrap_or(&cause)))
+        let cause = without_name(path, &cause.to_string());
+        Self::user(format!("`{}`: {cause}", path.display()))
     }
 
-    /// A file that cannot be written.
+    /// A file that is there, perhaps, but can't be read.
+    pub fn unreadable(path: &Path, cause: &io::Error) -> Self {
+        Self::input(path, format!("cannot be read ({cause}); {CHECK}"))
+    }
+
+    pub fn motion(path: &Path, cause: MotionError) -> Self {
+        match cause {
+            MotionError::Read { path, source } => Self::unreadable(&path, &source),
+            MotionError::Format { ref message, .. } if !message.contains("; ") => {
+                Self::input(path, format!("{cause}; retarget its clip again"))
+            }
+            cause => Self::input(path, cause),
+        }
+    }
+
+    pub fn skeleton(wanted: &Path, cause: SkeletonError) -> Self {
+        match cause {
+            SkeletonError::Read { path, source } => {
+                let known: Vec<_> = Skeleton::built_in().collect();
+                let known = known.join(", ");
+                let remedy = format!("{CHECK}, or use a built-in character: {known}");
+                Self::input(&path, format!("cannot be read ({source}); {remedy}"))
+            }
+            SkeletonError::UnknownName { .. } => Self::user(cause),
+            SkeletonError::Mjcf { .. } => {
+                Self::input(wanted, format!("{cause}; see that MuJoCo opens it"))
+            }
+            cause => Self::input(wanted, cause),
+        }
+    }
+
+    /// A file that cannot be written. The file is named once here too.
     pub fn write(path: &Path, cause: impl Display) -> Self {
-        Self::work(format!("cannot write `{}`: {cause}", path.display()))
+        let cause = without_name(path, &cause.to_string());
+        let cause = cause.trim_end_matches(CHECK).trim_end_matches("; ");
+        // The temporary file beside it is nobody's concern.
+        let cause = cause.split(" at path ").next().unwrap_or(cause);
+        Self::work(format!(
+            "cannot write `{}`: {cause}; {CHECK_ROOM}",
+            path.display()
+        ))
     }
 
     pub fn exit_code(&self) -> ExitCode {
@@ -72,6 +114,20 @@ impl From<io::Error> for Failure {
     }
 }
 
+/// What a cause says after the name of its file: `x: …`, `` `x`: … ``, `` `x` is … ``, `` cannot write `x`: … ``.
+fn without_name(path: &Path, cause: &str) -> String {
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let bare = cause.strip_prefix("cannot write ").unwrap_or(cause);
+    let rest = [path.to_string_lossy(), file].into_iter().find_map(|name| {
+        let quoted = format!("`{name}`");
+        let rest = bare
+            .strip_prefix(&quoted)
+            .or_else(|| bare.strip_prefix(&*name))?;
+        rest.strip_prefix(':').or(rest.strip_prefix(' '))
+    });
+    rest.map_or(cause, str::trim_start).to_owned()
+}
+
 fn one_line(message: impl Display) -> String {
     let text = message.to_string();
     let words: Vec<_> = text.split_whitespace().collect();
@@ -91,9 +147,32 @@ mod tests {
         let path = Path::new("a/kick.fbx");
         let plain = Failure::input(path, "truncated\n  at byte 3");
         assert_eq!(plain.message(), Some("`a/kick.fbx`: truncated at byte 3"));
-        for name in ["a/kick.fbx", "kick.fbx"] {
-            let named = Failure::input(path, format!("{name}: an empty file"));
+        for name in ["a/kick.fbx:", "kick.fbx:", "`a/kick.fbx`:", "`kick.fbx`"] {
+            let named = Failure::input(path, format!("{name} an empty file"));
             assert_eq!(named.message(), Some("`a/kick.fbx`: an empty file"));
+        }
+        let other = Failure::input(path, "kick.fbx.bin: an empty file");
+        assert_eq!(
+            other.message(),
+            Some("`a/kick.fbx`: kick.fbx.bin: an empty file")
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_named_once_with_a_remedy() {
+        let path = Path::new("a/kick.clip");
+        for cause in [
+            "no room",
+            "a/kick.clip: no room; check the path and its permissions",
+            "cannot write `a/kick.clip`: no room",
+            "no room at path \"a/.mimic-123\"",
+        ] {
+            assert_eq!(
+                Failure::write(path, cause).message(),
+                Some(
+                    "cannot write `a/kick.clip`: no room; check the path, its permissions and the room there"
+                )
+            );
         }
     }
 

@@ -4,7 +4,7 @@ use crate::args::{ImportArgs, RetargetArgs};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
-use mimic::clip::Clip;
+use mimic::clip::{Clip, Problem};
 use mimic::humanoid::HumanoidMap;
 use mimic::import;
 use mimic::motion::Motion;
@@ -66,6 +66,9 @@ impl Preparation {
         let options = retarget::Options { map };
         let done = retarget::retarget(&clip, &skeleton, &options)
             .map_err(|e| Failure::input(&self.file, e))?;
+        let new = |problem: &&Problem| !clip.problems.contains(problem);
+        let found: Vec<_> = done.report.problems.iter().filter(new).cloned().collect();
+        printer.problems(&found);
         let (mut motion, seconds) = (done.motion, Some(done.seconds));
         motion.name = self.name();
         Ok(Prepared {
@@ -83,11 +86,11 @@ impl Preparation {
                 "is retargeted already, `--map` doesn't apply; give the clip",
             ));
         }
-        let motion = Motion::load(&self.file).map_err(|e| Failure::input(&self.file, e))?;
+        let motion = Motion::load(&self.file).map_err(|e| Failure::motion(&self.file, e))?;
         let skeleton = self.skeleton_of(&motion)?;
         motion
             .check_skeleton(&skeleton)
-            .map_err(|e| Failure::input(&self.file, e))?;
+            .map_err(|e| Failure::motion(&self.file, e))?;
         printer.detail(format!("read `{}`", self.file.display()));
         Ok(Prepared {
             motion,
@@ -123,7 +126,7 @@ impl Preparation {
         let Some(path) = &self.retarget.map else {
             return Ok(None);
         };
-        let text = std::fs::read_to_string(path).map_err(|e| Failure::input(path, e))?;
+        let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
         let map =
             HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::input(path, e))?;
         Ok(Some(map))
