@@ -23,17 +23,21 @@ pub fn make_room(path: &Path, input: &Path) -> Outcome {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
     }
-    let same = match (path.canonicalize(), input.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    };
-    if same {
-        let path = path.display();
-        return Err(Failure::user(format!(
-            "`{path}` is the input itself, name another file with `--out`"
-        )));
+    // Only now: the way to the input may lead through the folder that wasn't there.
+    spare_input(path, input)
+}
+
+/// Refuses to replace the input of a result.
+pub fn spare_input(path: &Path, input: &Path) -> Outcome {
+    match (path.canonicalize(), input.canonicalize()) {
+        (Ok(a), Ok(b)) if a == b => {
+            let path = path.display();
+            Err(Failure::user(format!(
+                "`{path}` is the input itself, name another file to write"
+            )))
+        }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Whether `--out` means a folder: it is one, or ends like one.

@@ -20,7 +20,10 @@ pub enum Sink {
 
 /// Writes the whole recording and waits until it is there.
 pub fn write(shown: &Recording, sink: &Sink) -> Result<(), Box<dyn std::error::Error>> {
-    let builder = RecordingStreamBuilder::new(APPLICATION).recording_name(&shown.name);
+    // Somebody asked for it, whatever the variable RERUN says.
+    let builder = RecordingStreamBuilder::new(APPLICATION)
+        .recording_name(&shown.name)
+        .enabled(true);
     let stream = match sink {
         Sink::File(path) => builder.save(path)?,
         Sink::Viewer(address) => builder.connect_grpc_opts(address)?,

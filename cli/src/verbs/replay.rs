@@ -3,7 +3,7 @@
 use crate::args::{ImportArgs, RetargetArgs, at_least_one, positive};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::make_room;
+use crate::output::{make_room, result_path};
 use crate::prepare::Preparation;
 use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
@@ -21,6 +21,8 @@ Examples:
 
 /// Metres between agent and reference when they stand side by side.
 const BESIDE: f64 = 1.2;
+/// Seconds of a looping motion that are shown if nothing else is said.
+const SECONDS: f64 = 10.0;
 
 /// Watch an agent with its reference, or a motion alone, in the rerun viewer
 #[derive(clap::Args)]
@@ -31,15 +33,15 @@ pub struct Args {
     what: Option<PathBuf>,
     #[command(flatten)]
     sinks: Sinks,
-    /// Show the reference at the agent's side instead of over it
+    /// Show a run's reference at the agent's side instead of over it
     #[arg(long)]
     beside: bool,
-    /// Seconds to show of a looping motion that an agent performs
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive)]
-    seconds: f64,
-    /// Which motion to show, by number from 1, of a run that learned several
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
-    motion: usize,
+    /// Seconds to show of a looping motion that a run's agent performs [default: 10]
+    #[arg(long, value_name = "S", value_parser = positive)]
+    seconds: Option<f64>,
+    /// Which motion to show, by number from 1, of a run that learned several [default: 1]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    motion: Option<usize>,
     #[command(flatten)]
     import: ImportArgs,
     #[command(flatten)]
@@ -53,7 +55,7 @@ struct Sinks {
     /// Open the viewer
     #[arg(long)]
     rerun: bool,
-    /// Write the recording to a file
+    /// Write the recording to a file, or into a folder as NAME.rrd
     #[arg(long, value_name = "FILE.rrd")]
     save: Option<PathBuf>,
     /// Send it to a viewer that listens, e.g. 127.0.0.1:9876
@@ -73,15 +75,17 @@ impl Args {
         if self.beside {
             shown.beside = BESIDE;
         }
-        self.sinks.show(&shown, &source, viewer.as_ref(), printer)?;
+        let saved = self.sinks.file(&shown.name);
+        self.sinks
+            .show(&shown, &source, saved.as_deref(), viewer.as_ref(), printer)?;
         let json = json!({
             "name": shown.name,
-            "recording": self.sinks.save,
+            "recording": saved,
             "frames": shown.phase.len(),
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
         });
-        printer.result(&json, || summary(&shown, self.sinks.save.as_deref()))
+        printer.result(&json, || summary(&shown, saved.as_deref()))
     }
 }
 
@@ -92,16 +96,47 @@ impl Args {
             Some(what) => locate::existing_run(what),
             None => locate::newest_run(),
         };
-        if let Some(run) = run {
-            let recording = runs::record(&runs::open(Some(&run))?, self.motion - 1, self.seconds)?;
-            return Ok((recording, run));
+        match run {
+            Some(run) => Ok((self.record_run(&run)?, run)),
+            None => self.record_motion(library, printer),
         }
+    }
+
+    fn record_run(&self, run: &Path) -> Outcome<Recording> {
+        self.import.refuse_for(run, "a run")?;
+        self.retarget.refuse_for(run, "a run")?;
+        let which = self.motion.unwrap_or(1) - 1;
+        runs::record(
+            &runs::open(Some(run))?,
+            which,
+            self.seconds.unwrap_or(SECONDS),
+        )
+    }
+
+    fn record_motion(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
         let what = self.what.as_deref();
         let source = locate::file_or_newest(what, library, &locate::ANIMATIONS, "motion")?;
+        self.refuse_agent_flags(&source)?;
         let preparation = Preparation::new(source.clone(), &self.import, &self.retarget);
         let prepared = preparation.run(printer)?;
         let recording = Recording::of_motion(&prepared.motion, &prepared.skeleton);
         Ok((recording, source))
+    }
+
+    /// Flags about an agent have nothing to act on where there is none: refused, not ignored.
+    fn refuse_agent_flags(&self, file: &Path) -> Outcome {
+        let given = [
+            ("--beside", self.beside),
+            ("--seconds", self.seconds.is_some()),
+            ("--motion", self.motion.is_some()),
+        ];
+        let Some((flag, _)) = given.into_iter().find(|(_, given)| *given) else {
+            return Ok(());
+        };
+        Err(Failure::input(
+            file,
+            format!("has no agent, `{flag}` is for runs; give a run, or leave it out"),
+        ))
     }
 }
 
@@ -117,14 +152,21 @@ fn summary(shown: &Recording, saved: Option<&Path>) -> String {
 }
 
 impl Sinks {
+    /// The file that `--save` means.
+    fn file(&self, name: &str) -> Option<PathBuf> {
+        let save = self.save.as_deref()?;
+        Some(result_path(Some(save), name, "rrd"))
+    }
+
     fn show(
         &self,
         shown: &Recording,
         source: &Path,
+        saved: Option<&Path>,
         viewer: Option<&Viewer>,
         printer: &Printer,
     ) -> Outcome {
-        if let Some(path) = &self.save {
+        if let Some(path) = saved {
             save(shown, path, source)?;
         }
         if let Some(place) = &self.connect {
@@ -154,9 +196,24 @@ impl Sinks {
 /// Writes beside the goal and renames, so that no half recording is ever found.
 pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
     make_room(path, source)?;
-    let part = path.with_extension("rrd.part");
-    recording::write(shown, &Sink::File(part.clone())).map_err(|e| Failure::write(path, e))?;
-    std::fs::rename(&part, path).map_err(|e| Failure::write(path, e))
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".mimic-").suffix(".rrd");
+    // Temporary files are private by default; this one becomes a file like any other.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let part = builder
+        .tempfile_in(folder.unwrap_or(Path::new(".")))
+        .map_err(|e| Failure::write(path, e))?;
+    write(shown, part.path(), path)?;
+    part.persist(path)
+        .map_err(|e| Failure::write(path, e.error))?;
+    Ok(())
+}
+
+/// Writes into `part`, which will be `path`.
+fn write(shown: &Recording, part: &Path, path: &Path) -> Outcome {
+    recording::write(shown, &Sink::File(part.to_path_buf())).map_err(|e| Failure::write(path, e))
 }
 
 fn send(shown: &Recording, address: String) -> Outcome {
@@ -166,11 +223,10 @@ fn send(shown: &Recording, address: String) -> Outcome {
 }
 
 fn serve(shown: &Recording, viewer: &Viewer) -> Outcome {
-    let path = std::env::temp_dir().join(format!("mimic-{}.rrd", std::process::id()));
-    recording::write(shown, &Sink::File(path.clone())).map_err(|e| Failure::write(&path, e))?;
-    // The viewer ends by the same Ctrl-C; we outlive it to clean up.
-    ctrlc::set_handler(|| {}).ok();
-    let served = viewer.serve(&path);
-    std::fs::remove_file(&path).ok();
-    served
+    let failed = |e| Failure::write(&std::env::temp_dir(), e);
+    let mut builder = tempfile::Builder::new();
+    let file = builder.prefix("mimic-").suffix(".rrd").tempfile();
+    let file = file.map_err(failed)?;
+    write(shown, file.path(), file.path())?;
+    viewer.serve(file.path())
 }

@@ -3,7 +3,7 @@
 use crate::args::{ImportArgs, RetargetArgs};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{make_room, result_path};
+use crate::output::{make_room, result_path, spare_input};
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use serde_json::{Value, json};
@@ -43,10 +43,11 @@ impl Args {
             ));
         }
         let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
-        make_room(&output, &file)?;
+        spare_input(&output, &file)?;
         let Prepared {
             motion, seconds, ..
         } = preparation.run(printer)?;
+        make_room(&output, &file)?;
         let seconds = seconds.unwrap_or_default();
         motion
             .save(&output)

@@ -3,6 +3,7 @@
 mod exit_codes;
 mod output;
 mod readme;
+mod replay;
 mod stages;
 mod training;
 mod workbench;

@@ -19,6 +19,18 @@ impl Workbench {
         bench
     }
 
+    /// With `runs/sway`: a run that has learned nothing, but is whole.
+    pub fn with_run() -> Self {
+        let bench = Self::with_clip();
+        bench.write(
+            "tiny.json",
+            br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 32, "hidden": [8] }"#,
+        );
+        let line = ["train", "sway.txt", "--preset", "tiny.json"];
+        bench.mimic(&line).assert().success();
+        bench
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
@@ -53,6 +65,11 @@ impl Workbench {
         assert_eq!(text.lines().count(), 1, "one line: {text}");
         text
     }
+}
+
+/// Whether a message names this file once, and after what is wrong says what to do.
+pub fn has_remedy(said: &str, file: &str) -> bool {
+    said.matches(file).count() == 1 && said.contains("; ")
 }
 
 /// A DeepMimic motion: per frame its duration, root position and rotation, then joint rotations.

@@ -1,0 +1,147 @@
+//! Where recordings go, and what is refused.
+
+use crate::workbench::Workbench;
+use std::fs;
+
+fn names(bench: &Workbench, folder: &str) -> Vec<String> {
+    let entries = fs::read_dir(bench.path(folder)).into_iter().flatten();
+    let name = |entry: fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+    let mut names: Vec<_> = entries
+        .filter_map(|entry| Some(name(entry.ok()?)))
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_recording_goes_into_a_folder_and_spares_its_neighbours() {
+    let bench = Workbench::with_clip();
+    fs::create_dir(bench.path("out")).expect("a folder can be made");
+    bench.write("out/sway.rrd.part", b"somebody's own");
+    for save in ["out/", "out", "out/sway.rrd"] {
+        let shown = bench.json(&["replay", "sway.txt", "--save", save]);
+        assert_eq!(shown["recording"], "out/sway.rrd");
+        assert_eq!(names(&bench, "out"), ["sway.rrd", "sway.rrd.part"]);
+    }
+    let kept = fs::read(bench.path("out/sway.rrd.part")).unwrap_or_default();
+    assert_eq!(kept, b"somebody's own");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode =
+            |name: &str| fs::metadata(bench.path(name)).map(|m| m.permissions().mode() & 0o777);
+        assert_eq!(
+            mode("out/sway.rrd").ok(),
+            mode("sway.txt").ok(),
+            "a file like any other"
+        );
+    }
+}
+
+#[test]
+fn a_recording_is_written_whatever_the_environment_says() {
+    let bench = Workbench::with_clip();
+    let line = ["replay", "sway.txt", "--save", "sway.rrd"];
+    bench.mimic(&line).env("RERUN", "off").assert().success();
+    let bytes = fs::read(bench.path("sway.rrd")).unwrap_or_default();
+    assert!(bytes.len() > 10_000, "{} bytes", bytes.len());
+}
+
+#[test]
+fn flags_that_have_nothing_to_act_on_are_refused() {
+    let bench = Workbench::with_run();
+    for (flags, reason) in [
+        (&["--fps", "60"][..], "import options don't apply"),
+        (&["--take", "1"], "import options don't apply"),
+        (
+            &["--skeleton", "humanoid"],
+            "`--skeleton` and `--map` don't apply",
+        ),
+        (
+            &["--map", "map.json"],
+            "`--skeleton` and `--map` don't apply",
+        ),
+    ] {
+        let line = [&["replay", "sway", "--save", "a.rrd"], flags].concat();
+        let said = bench.complaint(&line, 2);
+        assert!(
+            said.contains("`runs/sway`: is a run") && said.contains(reason),
+            "{said}"
+        );
+    }
+    for flags in [&["--beside"][..], &["--seconds", "3"], &["--motion", "2"]] {
+        let line = [&["replay", "sway.txt", "--save", "a.rrd"], flags].concat();
+        let said = bench.complaint(&line, 2);
+        assert!(
+            said.contains("`sway.txt`: has no agent") && said.contains(flags[0]),
+            "{said}"
+        );
+    }
+    let line = [
+        "replay",
+        "sway",
+        "--save",
+        "beside.rrd",
+        "--beside",
+        "--seconds",
+        "1",
+        "--motion",
+        "1",
+    ];
+    let shown = bench.json(&line);
+    assert_eq!(shown["agent"], true);
+    bench.json(&["replay", "sway", "--save", "over.rrd", "--seconds", "1"]);
+    let read = |name: &str| fs::read(bench.path(name)).unwrap_or_default();
+    assert!(read("beside.rrd").starts_with(b"RRF"));
+    assert_ne!(read("beside.rrd").len(), 0);
+    let said = bench.complaint(&["replay", "sway", "--save", "a.rrd", "--motion", "2"], 2);
+    assert!(said.contains("no number 2"), "{said}");
+}
+
+/// A viewer that does nothing but end like this.
+#[cfg(unix)]
+fn with_viewer(script: &str) -> Workbench {
+    use std::os::unix::fs::PermissionsExt;
+    let bench = Workbench::with_clip();
+    let text =
+        format!("#!/bin/sh\n[ \"$1\" = --version ] && echo rerun 0.36.3 && exit\n{script}\n");
+    bench.write("rerun", text.as_bytes());
+    let executable = fs::Permissions::from_mode(0o755);
+    fs::set_permissions(bench.path("rerun"), executable).expect("it can be made executable");
+    bench
+}
+
+#[cfg(unix)]
+#[test]
+fn a_viewer_that_fails_is_failed_work() {
+    let bench = with_viewer("echo noise; exit 3");
+    for sink in ["--serve", "--rerun"] {
+        let mut command = bench.mimic(&["replay", "sway.txt", sink]);
+        let path = format!("{}:/usr/bin:/bin", bench.path(".").display());
+        let output = command.env("PATH", path).assert().code(1);
+        let output = output.get_output();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            said.contains("exit status: 3") && said.contains("--save"),
+            "{said}"
+        );
+        assert!(output.stdout.is_empty(), "the viewer's talk is no result");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_was_served_is_gone_afterwards() {
+    let bench = with_viewer("ls \"$2\"");
+    fs::create_dir(bench.path("tmp")).expect("a folder can be made");
+    let mut command = bench.mimic(&["replay", "sway.txt", "--serve", "--json"]);
+    let path = format!("{}:/usr/bin:/bin", bench.path(".").display());
+    let command = command.env("PATH", path).env("TMPDIR", bench.path("tmp"));
+    let output = command.assert().success();
+    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+    assert!(
+        said.contains("tmp/mimic-") && said.contains(".rrd"),
+        "{said}"
+    );
+    assert_eq!(names(&bench, "tmp"), Vec::<String>::new());
+}
