@@ -146,6 +146,15 @@ impl Printer {
             text.to_string()
         }
     }
+
+    /// What went wrong with one of several files, said also when little is to be said.
+    pub fn error(&self, text: impl AsRef<str>) {
+        self.talk(&format!(
+            "{} {}",
+            self.paint("error:", "31;1"),
+            text.as_ref()
+        ));
+    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::failure::Outcome;
 use crate::printer::Printer;
 use clap::CommandFactory;
 use clap_complete::Shell;
+use serde_json::json;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,6 +26,7 @@ impl Args {
     pub fn run(self, printer: &Printer) -> Outcome {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "mimic", &mut script);
-        printer.text(&String::from_utf8_lossy(&script))
+        let script = String::from_utf8_lossy(&script).into_owned();
+        printer.result(&json!({ "text": script }), || script.clone())
     }
 }

@@ -58,17 +58,23 @@ impl Args {
         let (mut reports, mut failures) = (Vec::new(), Vec::new());
         for step in &steps {
             bar.set_message(step.input.display().to_string());
-            match self.import(step, printer) {
-                Ok(report) => reports.push(report),
-                Err(failure) => failures.push(failure),
+            match self.import(step) {
+                Ok(report) => {
+                    bar.suspend(|| printer.problems(&report.problems));
+                    reports.push(report);
+                }
+                Err(failure) => failures.push((step.input.as_path(), failure)),
             }
             bar.inc(1);
         }
         bar.finish_and_clear();
-        if steps.len() == 1 {
-            failures.pop().map_or(Ok(()), Err)?;
+        if let [_] = steps[..] {
+            failures.pop().map_or(Ok(()), |(_, failure)| Err(failure))?;
+            return reports
+                .iter()
+                .try_for_each(|one| printer.result(one, || line(one)));
         }
-        print(&reports, steps.len(), printer)?;
+        print(&reports, &failures, printer)?;
         summary(failures, steps.len(), printer)
     }
 
@@ -109,7 +115,7 @@ impl Args {
         }
     }
 
-    fn import(&self, step: &Step, printer: &Printer) -> Outcome<Report> {
+    fn import(&self, step: &Step) -> Outcome<Report> {
         let Step { input, output } = step;
         if locate::has_extension(input, "clip") {
             return Err(Failure::input(
@@ -121,35 +127,38 @@ impl Args {
             import::load(input, &self.import.options()).map_err(|e| Failure::input(input, e))?;
         make_room(output, input)?;
         clip.save(output).map_err(|e| Failure::write(output, e))?;
-        printer.problems(&clip.problems);
         Ok(report(output, clip))
     }
 }
 
-fn print(reports: &[Report], files: usize, printer: &Printer) -> Outcome {
-    match reports {
-        [] => Ok(()),
-        [one] if files == 1 => printer.result(one, || line(one)),
-        many => printer.result(&json!({ "clips": many }), || {
-            many.iter().map(line).collect::<Vec<_>>().join("\n")
-        }),
+/// A file, and why it became no clip.
+type Failed<'a> = (&'a Path, Failure);
+
+/// The results of several files.
+fn print(reports: &[Report], failures: &[Failed], printer: &Printer) -> Outcome {
+    if printer.is_json() {
+        let failure =
+            |(file, failure): &Failed| json!({ "file": file, "message": failure.message() });
+        let failures: Vec<_> = failures.iter().map(failure).collect();
+        return printer.json_line(&json!({ "clips": reports, "failures": failures }));
     }
+    reports
+        .iter()
+        .try_for_each(|report| printer.text(&line(report)))
 }
 
 /// Ends as the worst of the files did.
-fn summary(failures: Vec<Failure>, files: usize, printer: &Printer) -> Outcome {
+fn summary(failures: Vec<Failed>, files: usize, printer: &Printer) -> Outcome {
     let count = failures.len();
-    for failure in &failures {
-        printer.warn(failure.message().unwrap_or_default());
+    for (_, failure) in &failures {
+        printer.error(failure.message().unwrap_or_default());
     }
     let message = format!("{count} of {files} files could not be imported");
-    match failures
-        .into_iter()
-        .min_by_key(|f| matches!(f, Failure::User(_)))
-    {
-        None => Ok(()),
-        Some(Failure::User(_)) => Err(Failure::user(message)),
-        Some(_) => Err(Failure::work(message)),
+    let is_user = |(_, failure): &Failed| matches!(failure, Failure::User(_));
+    match failures.iter().all(is_user) {
+        _ if count == 0 => Ok(()),
+        true => Err(Failure::user(message)),
+        false => Err(Failure::work(message)),
     }
 }
 

@@ -5,9 +5,10 @@ use crate::locate;
 use crate::output::{make_room, write_whole};
 use crate::printer::Printer;
 use mimic::clip::{Clip, Joint, Problem, Severity};
-use mimic::humanoid::{self, HumanoidMap};
+use mimic::humanoid::{self, HumanoidMap, NotHumanoid, Slot};
 use mimic::import::{self, TakeInfo};
 use serde::Serialize;
+use serde_json::json;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -54,24 +55,59 @@ impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let file = locate::file(&self.file, library, &locate::CLIPS)?;
         let (mut report, joints) = look(&file)?;
-        match humanoid::map(&joints) {
-            Ok(map) => {
-                report.map = rows(&map, &joints);
-                if let Some(path) = &self.write_map {
-                    make_room(path, &file)?;
-                    write_whole(path, map.to_json(&joints).as_bytes())?;
-                    printer.note(format!("wrote {}", path.display()));
-                }
+        let map = match humanoid::map(&joints) {
+            Ok(map) => map,
+            Err(e) => {
+                report.problems.push(not_humanoid(&e));
+                HumanoidMap::default()
             }
-            Err(e) if self.write_map.is_some() => return Err(Failure::input(&file, e)),
-            Err(e) => report.problems.push(Problem {
-                id: "not-humanoid".into(),
-                severity: Severity::Warning,
-                message: e.to_string(),
-            }),
+        };
+        report.map = rows(&map, &joints);
+        if let Some(path) = &self.write_map {
+            make_room(path, &file)?;
+            write_whole(path, map_file(&map, &joints).as_bytes())?;
+            tell(path, &map, printer);
         }
         printer.result(&report, || text(&report))
     }
+}
+
+fn not_humanoid(reason: &NotHumanoid) -> Problem {
+    Problem {
+        id: "not-humanoid".into(),
+        severity: Severity::Warning,
+        message: reason.to_string(),
+    }
+}
+
+/// The map as a file to edit. What has to be named in it is there as `null`.
+fn map_file(map: &HumanoidMap, joints: &[Joint]) -> String {
+    if empty(map).is_empty() {
+        return map.to_json(joints);
+    }
+    let line = |slot: Slot| {
+        let joint = map.joint(slot).and_then(|joint| joints.get(joint));
+        let name = json!(joint.map(|joint| &joint.name));
+        format!("  {}: {name}", json!(slot.name()))
+    };
+    format!("{{\n{}\n}}\n", Slot::ALL.map(line).join(",\n"))
+}
+
+fn empty(map: &HumanoidMap) -> Vec<&'static str> {
+    let needed = Slot::REQUIRED.into_iter();
+    let empty = needed.filter(|slot| map.joint(*slot).is_none());
+    empty.map(Slot::name).collect()
+}
+
+fn tell(path: &Path, map: &HumanoidMap, printer: &Printer) {
+    let (path, empty) = (path.display(), empty(map));
+    if empty.is_empty() {
+        return printer.note(format!("wrote {path}"));
+    }
+    let empty = empty.join(", ");
+    printer.warn(format!(
+        "`{path}` needs joints for {empty}: write their names there, `mimic info --json` lists them under `joints`"
+    ));
 }
 
 fn look(file: &Path) -> Outcome<(Report, Vec<Joint>)> {

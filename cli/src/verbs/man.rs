@@ -28,7 +28,8 @@ impl Args {
         let mut command = Cli::command().disable_help_subcommand(true);
         command.build();
         let Some(folder) = self.out else {
-            return printer.text(&page(command)?);
+            let page = page(command)?;
+            return printer.result(&json!({ "text": page }), || page.clone());
         };
         let pages = write_pages(&command, &folder)?;
         printer.result(&json!({ "pages": pages }), || pages.join("\n"))

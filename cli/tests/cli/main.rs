@@ -1,9 +1,11 @@
 //! The `mimic` program as its users meet it.
 
 mod exit_codes;
+mod import;
 mod output;
 mod readme;
 mod replay;
 mod stages;
+mod talk;
 mod training;
 mod workbench;
