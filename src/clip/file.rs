@@ -68,7 +68,6 @@ impl Clip {
         Clip::from_bytes(&bytes).map_err(|e| Error::broken(path, e))
     }
 
-    /// The bytes of the clip's file.
     /// Rounds all transforms to what the clip's file can hold, so that a clip is the same whether it comes from a file
     /// of its own or straight from the importer.
     pub(crate) fn round_to_file(&mut self) {
@@ -78,6 +77,7 @@ impl Clip {
         }
     }
 
+    /// The bytes of the clip's file.
     fn to_bytes(&self) -> Result<Vec<u8>, String> {
         let header = Header {
             format: FORMAT.to_owned(),

@@ -7,7 +7,7 @@ mod sampling;
 mod tests;
 
 pub use error::Error;
-pub(crate) use sampling::{Grid, MOST_TRANSFORMS, slerp};
+pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
 
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};

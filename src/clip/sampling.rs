@@ -39,21 +39,21 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// `None` where `fps` isn't a rate that can be sampled, or the frames would be more than `most`.
+    /// `None` where `fps` isn't a rate that can be sampled, or the frames would be more than `most`. A span too short
+    /// for two frames at any rate is an instant, of one frame.
     pub fn new(duration: f64, fps: f64, most: usize) -> Option<Self> {
         if !(fps > 0.0 && fps <= MOST_FPS && duration >= 0.0) {
             return None;
         }
-        let intervals = (duration * fps)
-            .round()
-            .max(f64::from(u8::from(duration > 0.0)));
+        let fit = (duration * MOST_FPS).floor();
+        let intervals = (duration * fps).round().max(1.0).min(fit);
         if intervals >= most as f64 {
             return None;
         }
-        let even = if duration > 0.0 {
-            intervals / duration
+        let (duration, even) = if intervals > 0.0 {
+            (duration, (intervals / duration).min(MOST_FPS))
         } else {
-            fps
+            (0.0, fps)
         };
         let fps = if (even - fps).abs() <= SAME_RATE * fps {
             fps

@@ -100,6 +100,30 @@ fn rates_that_cannot_be_sampled_are_refused() {
 }
 
 #[test]
+fn no_span_is_sampled_faster_than_files_allow() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("part.clip");
+    let clip = arm(31, 30.0);
+    for (length, fps, frames) in [
+        (0.0, 30.0, 1),
+        (1e-5, 30.0, 1),
+        (1.5e-4, 30.0, 2),
+        (1.5e-4, 10_000.0, 2),
+        (0.02, 30.0, 2),
+    ] {
+        let fast = Clip {
+            fps,
+            ..clip.clone()
+        };
+        let from = 0.5 * fast.duration();
+        let part = fast.trim(from, from + length).expect("it trims");
+        assert_eq!(part.frames.len(), frames, "{length} s at {fps} Hz");
+        part.save(&path).expect("it is written");
+        assert_eq!(Clip::load(&path).expect("it is read").fps, part.fps);
+    }
+}
+
+#[test]
 fn the_file_gives_the_clip_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("arm.clip");
