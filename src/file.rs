@@ -1,5 +1,6 @@
 //! Writing files so that nobody ever finds half of one.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -9,6 +10,11 @@ use std::path::Path;
 /// # Errors
 /// A folder that isn't there or can't be written, or a full disk.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    replace_by(path, |file| file.write_all(bytes))
+}
+
+/// The same with what `write` writes.
+fn replace_by(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let folder = path
         .parent()
         .filter(|parent| !parent.as_os_str().is_empty())
@@ -19,7 +25,7 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(folder)?;
-    file.write_all(bytes)?;
+    write(file.as_file_mut())?;
     file.as_file().sync_all()?;
     file.persist(path)?;
     Ok(())
@@ -29,16 +35,43 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    /// Names and contents of the files in a folder.
+    fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+        let entries = std::fs::read_dir(folder).expect("listed");
+        let file = |entry: io::Result<std::fs::DirEntry>| {
+            let entry = entry.expect("an entry");
+            let name = entry.file_name().to_string_lossy().into_owned();
+            (name, std::fs::read(entry.path()).expect("read"))
+        };
+        entries.map(file).collect()
+    }
+
     #[test]
-    fn a_failed_write_keeps_the_old_file_and_leaves_nothing_else() {
+    fn a_write_that_stops_half_way_keeps_the_old_file_and_leaves_nothing_else() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("whole.txt");
         replace(&path, b"first").expect("written");
         replace(&path, b"second").expect("replaced");
-        assert_eq!(std::fs::read(&path).expect("read"), b"second");
-        let nowhere = folder.path().join("missing/whole.txt");
-        assert!(replace(&nowhere, b"third").is_err());
-        let left: Vec<_> = std::fs::read_dir(folder.path()).expect("listed").collect();
-        assert_eq!(left.len(), 1, "{left:?}");
+        let whole = vec![("whole.txt".to_owned(), b"second".to_vec())];
+        assert_eq!(files(folder.path()), whole);
+        let half = replace_by(&path, |file| {
+            file.write_all(b"th")?;
+            assert_eq!(std::fs::read(&path)?, b"second");
+            Err(io::Error::other("the disk is full"))
+        });
+        assert!(half.is_err());
+        assert_eq!(files(folder.path()), whole);
+    }
+
+    #[test]
+    fn what_can_not_be_replaced_is_kept() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let taken = folder.path().join("taken");
+        std::fs::create_dir(&taken).expect("a folder");
+        std::fs::write(taken.join("inside.txt"), b"kept").expect("written");
+        assert!(replace(&taken, b"third").is_err());
+        assert!(replace(&folder.path().join("missing/whole.txt"), b"third").is_err());
+        assert_eq!(files(&taken), [("inside.txt".to_owned(), b"kept".to_vec())]);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
     }
 }
