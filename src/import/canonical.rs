@@ -39,7 +39,8 @@ impl<'a> Rig<'a> {
             });
         }
         let parents = parents(scene, &nodes);
-        let (joints, problems) = (Vec::new(), Vec::new());
+        let left_out = first.and_then(|(take, _)| tree::left_out(scene, &nodes, take));
+        let (joints, problems) = (Vec::new(), Vec::from_iter(left_out));
         let mut rig = Self {
             file,
             scene,

@@ -6,8 +6,9 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// A heading this near to a quarter turn is meant to be one: rest poses stand a few degrees askew.
-const SNAP: f64 = 10.0 * PI / 180.0;
+/// A heading this near to a quarter turn is meant to be one: rest poses stand a few degrees askew, and those taken from
+/// a stride turn the hips more.
+const SNAP: f64 = 15.0 * PI / 180.0;
 
 /// Left and right places of paired joints (hips, shoulders), in canonical axes.
 pub(crate) type Pair = (Vector3<f64>, Vector3<f64>);

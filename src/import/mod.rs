@@ -350,3 +350,14 @@ fn stem(file: &str) -> &str {
     file.rsplit_once('.')
         .map_or(file, |(stem, _)| if stem.is_empty() { file } else { stem })
 }
+/// A list of at most eight items, and how many more there are.
+fn few(items: impl ExactSizeIterator<Item = String>) -> String {
+    const MOST: usize = 8;
+    let more = items.len().saturating_sub(MOST);
+    let list = items.take(MOST).collect::<Vec<_>>().join(", ");
+    match more {
+        0 => list,
+        more => format!("{list}, … and {more} more"),
+    }
+}
+

@@ -70,10 +70,7 @@ fn find(scene: &dyn Scene, wanted: &str) -> Option<usize> {
 
 fn list(scene: &dyn Scene) -> String {
     let takes = scene.takes().iter().enumerate();
-    let named: Vec<String> = takes
-        .map(|(at, take)| format!("{} `{}`", at + 1, take.name))
-        .collect();
-    named.join(", ")
+    super::few(takes.map(|(at, take)| format!("{} `{}`", at + 1, take.name)))
 }
 
 /// The take in which most nodes move for longest; the first of equals.

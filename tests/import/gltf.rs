@@ -15,7 +15,7 @@ fn load(path: &Path, take: &str) -> Clip {
     import::load(path, &options).expect("it imports")
 }
 
-/// Farthest that a joint is from its place by `reference`, metres.
+/// Farthest that a joint is from its place by `reference`, metres. No node that the take moves may be missing.
 ///
 /// X, Y, Z are the file's z, x, y, X and Y with sign `facing`: −1 for a character that was turned by half.
 fn farthest(clip: &Clip, reference: &Reference, take: &str, facing: f64) -> f64 {
@@ -37,6 +37,13 @@ fn farthest(clip: &Clip, reference: &Reference, take: &str, facing: f64) -> f64 
                 .expect("the joint's node")
         })
         .collect();
+    for node in reference.moved(about) {
+        assert!(
+            node_of.contains(&node),
+            "no joint for `{}`",
+            node_paths[node]
+        );
+    }
     let last = (clip.frames.len() - 1).max(1) as f64;
     let mut farthest: f64 = 0.0;
     for f in 0..clip.frames.len() {

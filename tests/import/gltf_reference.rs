@@ -91,6 +91,20 @@ impl Reference {
         )
     }
 
+    /// Nodes that a take moves, but for meshes that carry no other nodes.
+    pub fn moved(&self, take: &Value) -> Vec<usize> {
+        let moves = |channel: &&Value| channel["target"]["path"] != "weights";
+        let channels = take["channels"].as_array().expect("channels").iter();
+        let nodes = channels
+            .filter(moves)
+            .map(|channel| index(&channel["target"]["node"]));
+        let carries = |node: &usize| {
+            let about = &self.json["nodes"][*node];
+            about["mesh"].is_null() || !about["children"].is_null()
+        };
+        nodes.filter(carries).collect()
+    }
+
     /// World matrices of all nodes at `time` of `take`.
     pub fn world(&self, take: &Value, time: f64) -> Vec<Matrix> {
         let nodes = self.json["nodes"].as_array().expect("nodes");

@@ -2,43 +2,23 @@
 
 use super::super::*;
 use super::assert_maps;
-use nalgebra::{Isometry3, Matrix4, Vector3};
+use crate::import;
+use nalgebra::Isometry3;
 use std::path::PathBuf;
 
-fn data(file: &str) -> Option<Vec<u8>> {
-    let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
-    let bytes = std::fs::read(root.join(file)).ok();
-    if bytes.is_none() {
+fn data(file: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(file);
+    let found = path.exists().then_some(path);
+    if found.is_none() {
         eprintln!("skipped: no test data `{file}`");
     }
-    bytes
+    found
 }
 
-/// All nodes of a glTF file as joints, its +Y turned to +Z and its +Z to +X.
+/// The joints that the importer finds in a glTF file.
 fn gltf_joints(file: &str) -> Option<Vec<Joint>> {
-    let gltf = gltf::Gltf::from_slice_without_validation(&data(file)?).unwrap();
-    let mut joints: Vec<Joint> = Vec::new();
-    let mut stack: Vec<(gltf::Node, Option<usize>, Matrix4<f64>)> = gltf
-        .scenes()
-        .flat_map(|s| s.nodes())
-        .map(|n| (n, None, Matrix4::identity()))
-        .collect();
-    let mut at: Vec<Vector3<f64>> = Vec::new();
-    while let Some((node, parent, above)) = stack.pop() {
-        let local = Matrix4::from_fn(|r, c| f64::from(node.transform().matrix()[c][r]));
-        let world = above * local;
-        let here = Vector3::new(world[(2, 3)], world[(0, 3)], world[(1, 3)]);
-        let offset = here - parent.map_or_else(Vector3::zeros, |p: usize| at[p]);
-        let index = joints.len();
-        joints.push(Joint {
-            name: node.name().unwrap_or_default().to_owned(),
-            parent,
-            rest: Isometry3::translation(offset.x, offset.y, offset.z),
-        });
-        at.push(here);
-        stack.extend(node.children().map(|child| (child, Some(index), world)));
-    }
-    Some(joints)
+    let look = import::inspect(data(file)?).unwrap_or_else(|e| panic!("{e}"));
+    Some(look.joints)
 }
 
 const MIXAMO: [(&str, &str); 21] = [
@@ -159,7 +139,7 @@ fn unreal_names_map() {
 /// Joints of DeepMimic's humanoid from its character file, whose axes are Y up and X forward.
 fn deepmimic_joints() -> Option<Vec<Joint>> {
     let file: serde_json::Value =
-        serde_json::from_slice(&data("deepmimic/humanoid3d.txt")?).unwrap();
+        serde_json::from_slice(&std::fs::read(data("deepmimic/humanoid3d.txt")?).unwrap()).unwrap();
     let joints = file["Skeleton"]["Joints"].as_array().unwrap();
     let number = |joint: &serde_json::Value, key: &str| joint[key].as_f64().unwrap();
     let build = |joint: &serde_json::Value| Joint {
