@@ -1,7 +1,7 @@
 //! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one fixed humanoid.
 
 use super::scene::{Node, Scene, Take};
-use crate::clip::{Problem, Severity, slerp};
+use crate::clip::{MOST_FPS, Problem, Severity, slerp};
 use nalgebra::{Matrix3, Matrix4, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// Numbers in one frame: duration, root position, root rotation, then the joints in the order of [`JOINTS`].
@@ -131,6 +131,9 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimic
             .filter(|&j| JOINTS[j].kind != Kind::Fixed)
             .collect(),
         wraps,
+        channels: JOINTS.len(),
+        problems: Vec::new(),
+        fault: None,
     };
     Ok(DeepMimicScene {
         nodes: nodes(),
@@ -229,14 +232,14 @@ fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
 }
 
 /// Frames per second: by the median of the frames' durations, as a whole number where it is within 0.1 % of one
-/// (the files write 1/30 s as 0.033332).
+/// (the files write 1/30 s as 0.033332), and within what can be sampled.
 fn rate(poses: &[Pose]) -> f64 {
     let mut gaps: Vec<f64> = poses.windows(2).map(|w| w[1].time - w[0].time).collect();
     gaps.sort_by(f64::total_cmp);
     let Some(&gap) = gaps.get(gaps.len() / 2) else {
         return 30.0;
     };
-    let rate = 1.0 / gap;
+    let rate = (1.0 / gap).clamp(1.0, MOST_FPS);
     let whole = rate.round();
     if (rate - whole).abs() < 1e-3 * whole {
         whole

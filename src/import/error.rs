@@ -36,6 +36,8 @@ pub enum Error {
         wanted: String,
         takes: String,
     },
+    #[error("{file}: {reason}")]
+    Take { file: String, reason: String },
     #[error(
         "{file}: trim {from}..{to} s leaves nothing of take `{take}`, which lasts {duration} s; trim within it"
     )]

@@ -40,6 +40,8 @@ const MOST_BYTES: u64 = 2 << 30;
 const FREE_TRANSFORMS: usize = 1 << 20;
 const TRANSFORMS_PER_BYTE: f64 = 0.5;
 
+/// Nodes or channels that may be looked at for each of these transforms: most of a file's nodes may be no joints.
+const LOOKS_PER_TRANSFORM: usize = 8;
 /// How a file is to be read, where it shouldn't decide itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
@@ -109,7 +111,8 @@ pub fn read(
 ) -> Result<Clip, Error> {
     let scene = open(bytes, file, folder)?;
     let (take, note) = take::choose(scene.as_ref(), file, options.take.as_deref())?;
-    let most = FREE_TRANSFORMS + (bytes.len() as f64 * TRANSFORMS_PER_BYTE) as usize;
+    let read = bytes.len().saturating_add(scene.bytes_beside());
+    let most = FREE_TRANSFORMS + (read as f64 * TRANSFORMS_PER_BYTE) as usize;
     let mut clip = clip(scene.as_ref(), file, take, options, most)?;
     clip.source.sha256 = Sha256::digest(bytes)
         .iter()
@@ -154,6 +157,8 @@ fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
     let rig = Rig::new(scene, file, frame(scene, file, &Options::default())?, first)?;
     let mut problems = scene.problems().to_vec();
     problems.extend(rig.problems);
+    problems.extend(scene.takes().iter().flat_map(|take| take.problems.clone()));
+    problems.extend(scene.takes().iter().filter_map(broken_take));
     if default_take.is_none() {
         problems.push(Problem {
             id: "no-takes".to_owned(),
@@ -173,11 +178,21 @@ fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
 }
 
 fn take_info(take: &Take) -> TakeInfo {
+fn broken_take(take: &Take) -> Option<Problem> {
+    Some(Problem {
+        id: "broken-take".to_owned(),
+        severity: Severity::Error,
+        message: take.fault.clone()?,
+    })
+}
+
     let duration_s = take.end - take.start;
     TakeInfo {
+    // Keys may be farther apart than frames can be counted.
+    let grid = Grid::new(duration_s, take.fps, usize::MAX);
         name: take.name.clone(),
         fps: take.fps,
-        frames: (duration_s * take.fps).round() as usize + 1,
+        frames: grid.map_or(usize::MAX, |grid| grid.frames),
         duration_s,
     }
 }
@@ -215,9 +230,11 @@ fn clip(
     )?;
     let fps = options.fps.unwrap_or(about.fps);
     let grid = grid(scene, file, about, end - start, fps, most)?;
+    let most = most_frames(scene, about, rig.joints.len(), most);
     let world = rig.frames(take, start, &grid)?;
     let mut problems = scene.problems().to_vec();
     problems.extend(sampling_problems(&grid, fps, &world));
+    problems.extend_from_slice(&about.problems);
     let wraps = match options.loop_mode {
         Some(mode) => mode == LoopMode::Wrap,
         None => about
@@ -273,6 +290,15 @@ fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<(f64, f64),
 }
 
 fn grid(
+/// Most frames that a take may be sampled to, given the most `transforms`: what is kept are the joints, but the time
+/// goes to all nodes and channels.
+fn most_frames(scene: &dyn Scene, take: &Take, joints: usize, transforms: usize) -> usize {
+    let transforms = transforms.min(MOST_TRANSFORMS);
+    let looks = scene.nodes().len().max(take.channels);
+    let kept = transforms / joints.max(1);
+    kept.min(transforms.saturating_mul(LOOKS_PER_TRANSFORM) / looks.max(1))
+}
+
     scene: &dyn Scene,
     file: &str,
     take: &Take,
@@ -287,13 +313,11 @@ fn grid(
             fps,
         });
     };
-    Grid::new(duration, one.fps, most.min(MOST_TRANSFORMS) / nodes.max(1)).ok_or_else(|| {
-        Error::TooLong {
-            file: file.to_owned(),
-            take: take.name.clone(),
-            frames: (duration * fps).round() + 1.0,
-            nodes,
-        }
+    Grid::new(duration, one.fps, most).ok_or_else(|| Error::TooLong {
+        file: file.to_owned(),
+        take: take.name.clone(),
+        frames: (duration * fps).round() + 1.0,
+        nodes,
     })
 }
 

@@ -22,12 +22,18 @@ pub(crate) struct Take {
     pub start: f64,
     /// Seconds; not before `start`.
     pub end: f64,
-    /// Frame rate that the file states or its keys keep, in Hz.
+    /// Frame rate that the file states or its keys keep, in Hz, from 1 to 10,000.
     pub fps: f64,
     /// Nodes that this take moves.
     pub animated: Vec<usize>,
     /// `Some` where the format itself says whether the take loops.
     pub wraps: Option<bool>,
+    /// Curves, or groups of them, that are looked at to place the nodes once.
+    pub channels: usize,
+    /// What the reader found wrong, or left out, in this take.
+    pub problems: Vec<Problem>,
+    /// Why this take can't be used, and what to do.
+    pub fault: Option<String>,
 }
 
 /// An animation file after parsing. Nothing in it can be out of range any more.
@@ -44,6 +50,10 @@ pub(crate) trait Scene {
     fn canonical_from_file(&self) -> Matrix3<f64>;
     /// World matrices of all nodes, in the file's axes and units: at `time` seconds of `take`, or at rest.
     fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>>;
-    /// What the reader found wrong, or left out, in the file.
+    /// What the reader found wrong, or left out, in the file, whichever take is used.
     fn problems(&self) -> &[Problem];
+    /// Bytes that were read from other files.
+    fn bytes_beside(&self) -> usize {
+        0
+    }
 }

@@ -5,8 +5,11 @@ use super::scene::Scene;
 use crate::clip::{Problem, Severity};
 use nalgebra::Matrix4;
 
-/// Times within a take at which its motion is looked at when it has to be compared with others.
+/// How often a take's motion is looked at when it has to be compared with others.
 const LOOKS: usize = 9;
+/// The looks' places in a take are fractions of this number's multiples, which no number of equal cycles repeats at:
+/// (√5 − 1) / 2.
+const UNEVEN: f64 = 0.618_033_988_749_894_8;
 
 /// Most node placements that takes are compared by; a file with more is judged by what has curves alone.
 const MOST_PLACEMENTS: usize = 1 << 22;
@@ -23,19 +26,24 @@ pub(crate) fn choose(
             file: file.to_owned(),
         });
     }
-    match wanted {
-        Some(wanted) => match find(scene, wanted) {
-            Some(take) => Ok((take, None)),
-            None => Err(Error::UnknownTake {
-                file: file.to_owned(),
-                wanted: wanted.to_owned(),
-                takes: list(scene),
-            }),
-        },
+    let unknown = |wanted: &str| Error::UnknownTake {
+        file: file.to_owned(),
+        wanted: wanted.to_owned(),
+        takes: list(scene),
+    };
+    let (take, note) = match wanted {
+        Some(wanted) => (find(scene, wanted).ok_or_else(|| unknown(wanted))?, None),
         None => {
             let take = most_motion(scene);
-            Ok((take, (scene.takes().len() > 1).then(|| note(scene, take))))
+            (take, (scene.takes().len() > 1).then(|| note(scene, take)))
         }
+    };
+    match &scene.takes()[take].fault {
+        Some(reason) => Err(Error::Take {
+            file: file.to_owned(),
+            reason: reason.clone(),
+        }),
+        None => Ok((take, note)),
     }
 }
 
@@ -89,11 +97,15 @@ pub(crate) fn most_motion(scene: &dyn Scene) -> usize {
     best.0
 }
 
-/// Animated nodes × seconds, nought for a take in which nothing changes place, as far as that is looked at.
+/// Animated nodes × seconds, nought for a take in which nothing changes place, as far as that is looked at, and less
+/// for one that can't be used.
 fn amount(scene: &dyn Scene, take: usize) -> f64 {
     let Some(about) = scene.takes().get(take) else {
         return 0.0;
     };
+    if about.fault.is_some() {
+        return -1.0;
+    }
     let span = about.end - about.start;
     if about.animated.is_empty() || span <= 0.0 {
         return 0.0;
@@ -104,10 +116,8 @@ fn amount(scene: &dyn Scene, take: usize) -> f64 {
         return all;
     }
     let look = |k: usize| {
-        scene.world(Some((
-            take,
-            about.start + span * k as f64 / (LOOKS - 1) as f64,
-        )))
+        let part = (k as f64 * UNEVEN).fract();
+        scene.world(Some((take, about.start + span * part)))
     };
     let first = look(0);
     let size = first

@@ -13,6 +13,10 @@ use std::collections::BTreeMap;
 pub(super) struct Curves {
     pub list: Vec<Curve>,
     of_object: BTreeMap<usize, Option<usize>>,
+    /// Constants of the curve nodes that were read. Reading their properties takes time, and layers may share them.
+    constants: BTreeMap<usize, [Option<f64>; 3]>,
+    /// The same for layers.
+    layers: BTreeMap<usize, Layer>,
     /// Ticks per second.
     ticks: f64,
     budget: usize,
@@ -35,6 +39,8 @@ impl Curves {
         Self {
             list: Vec::new(),
             of_object: BTreeMap::new(),
+            constants: BTreeMap::new(),
+            layers: BTreeMap::new(),
             ticks,
             budget,
             steps: links.saturating_mul(STEPS_PER_LINK),
@@ -46,12 +52,14 @@ impl Curves {
         spend(&mut self.steps, steps)
     }
 
-    /// Loads a curve that one more channel uses.
-    fn share(&mut self, object: &Object, index: usize) -> Result<Option<usize>, FbxError> {
-        let place = self.load(object, index)?;
-        let keys = place.and_then(|place| self.list.get(place));
-        spend(&mut self.keys, keys.map_or(0, Curve::len))?;
-        Ok(place)
+    /// Counts the keys of curves that one more channel uses.
+    fn share(&mut self, axes: [Option<usize>; 3]) -> Result<(), FbxError> {
+        let curves = axes.into_iter().flatten();
+        let keys = curves
+            .filter_map(|curve| self.list.get(curve))
+            .map(Curve::len);
+        let keys = keys.sum();
+        spend(&mut self.keys, keys)
     }
 
     fn load(&mut self, object: &Object, index: usize) -> Result<Option<usize>, FbxError> {
@@ -96,8 +104,11 @@ enum Blend {
     Passthrough,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Layer {
+    muted: bool,
+    /// While some layer is solo, only such layers count.
+    solo: bool,
     blend: Blend,
     /// Rotations join as rotations, not angle by angle.
     compose_rotation: bool,
@@ -147,67 +158,90 @@ impl Animation {
             layers: Vec::new(),
             channels: BTreeMap::new(),
         };
-        for link in graph.children(stack, "AnimationLayer") {
-            let record = graph.objects[link.child].record;
-            curves.walk(1 + graph.degree(link.child))?;
-            if animation.layers.len() == MOST_LAYERS {
-                return Err(implausible("a take has too many layers"));
+        let objects: Vec<usize> = graph
+            .children(stack, "AnimationLayer")
+            .map(|link| link.child)
+            .collect();
+        if objects.len() > MOST_LAYERS {
+            return Err(implausible("a take has too many layers"));
+        }
+        for &object in &objects {
+            curves.walk(1 + graph.degree(object))?;
+            let read = || layer(&templates.properties(graph.objects[object].record));
+            let layer = curves.layers.entry(object).or_insert_with(read).clone();
+            animation.layers.push(layer);
+        }
+        let take = &graph.objects[stack].name;
+        for (layer, &object) in objects.iter().enumerate() {
+            if animation.counts(layer) {
+                animation.read_channels(graph, take, (layer, object), templates, tree, curves)?;
             }
-            animation.layers.push(layer(&templates.properties(record)));
-            animation.read_channels(graph, link.child, templates, tree, curves)?;
         }
         Ok(animation)
+    }
+
+    /// Whether a layer is neither muted nor put aside for one that is solo.
+    fn counts(&self, layer: usize) -> bool {
+        let some_solo = self.layers.iter().any(|layer| layer.solo);
+        !self.layers[layer].muted && (self.layers[layer].solo || !some_solo)
+    }
+
+    /// Number of layers that don't count.
+    pub fn silent(&self) -> usize {
+        let layers = 0..self.layers.len();
+        layers.filter(|&layer| !self.counts(layer)).count()
     }
 
     fn read_channels(
         &mut self,
         graph: &Graph,
-        layer: usize,
+        take: &str,
+        (layer, object): (usize, usize),
         templates: &Templates,
         tree: &Tree,
         curves: &mut Curves,
     ) -> Result<(), FbxError> {
-        for link in graph.children(layer, "AnimationCurveNode") {
+        for link in graph.children(object, "AnimationCurveNode") {
             let curve_node = link.child;
             curves.walk(1 + 2 * graph.degree(curve_node))?;
-            let properties = templates.properties(graph.objects[curve_node].record);
-            for target in graph.parents(curve_node, "Model") {
-                let property = target.property.and_then(Property::named);
-                let (Some(property), Some(node)) = (property, tree.of_object[target.parent]) else {
-                    continue;
-                };
-                let axes = axes(graph, curve_node, curves)?;
-                self.add(
-                    node,
-                    property,
-                    constants(&properties),
-                    axes,
-                    &tree.rigs[node],
-                );
-            }
-            if graph
+            let targets = graph.parents(curve_node, "Model").filter_map(|target| {
+                let property = target.property.and_then(Property::named)?;
+                Some((tree.of_object[target.parent]?, property))
+            });
+            let mut targets = targets.peekable();
+            let weighs = graph
                 .parents(curve_node, "AnimationLayer")
-                .any(|l| l.parent == layer && l.property == Some(b"Weight"))
-            {
-                let [curve, ..] = axes(graph, curve_node, curves)?;
-                if let Some(layer) = self.layers.last_mut() {
-                    layer.weight_curve = curve;
-                }
+                .any(|link| link.parent == object && link.property == Some(b"Weight"));
+            let driven = match targets.peek() {
+                Some(&(node, _)) => format!("joint `{}`", tree.nodes[node].name),
+                None if weighs => format!("weight of layer `{}`", graph.objects[object].name),
+                None => continue,
+            };
+            let within = |e: FbxError| e.within(&format!("take `{take}`, {driven}"));
+            let axes = axes(graph, curve_node, curves).map_err(within)?;
+            let read = || constants(&templates.properties(graph.objects[curve_node].record));
+            let constants = *curves.constants.entry(curve_node).or_insert_with(read);
+            for (node, property) in targets {
+                curves.share(axes)?;
+                self.add(layer, node, property, constants, axes, &tree.rigs[node]);
+            }
+            if weighs {
+                self.layers[layer].weight_curve = axes[0];
             }
         }
         Ok(())
     }
 
-    /// Adds a channel to the last layer, unless that layer already drives the property.
+    /// Adds a channel to a layer above all that have some, unless that layer already drives the property.
     fn add(
         &mut self,
+        layer: usize,
         node: usize,
         property: Property,
         constants: [Option<f64>; 3],
         curves: [Option<usize>; 3],
         rig: &Rig,
     ) {
-        let layer = self.layers.len().saturating_sub(1);
         let channels = self.channels.entry(node).or_default();
         let mut own = channels
             .iter()
@@ -235,6 +269,11 @@ impl Animation {
 
     pub fn channels(&self, node: usize) -> &[Channel] {
         self.channels.get(&node).map_or(&[], Vec::as_slice)
+    }
+
+    /// Layers and channels.
+    pub fn size(&self) -> usize {
+        self.layers.len() + self.channels.values().map(Vec::len).sum::<usize>()
     }
 
     /// Weights of all layers at `tick`.
@@ -319,7 +358,10 @@ fn unit_weight(percent: f64) -> f64 {
 
 fn layer(properties: &Properties) -> Layer {
     let composes = |name| properties.int(name).unwrap_or(0) == 0;
+    let is = |name| properties.int(name).unwrap_or(0) != 0;
     Layer {
+        muted: is("Mute"),
+        solo: is("Solo"),
         blend: match properties.int("BlendMode").unwrap_or(0) {
             0 => Blend::Additive,
             2 => Blend::Passthrough,
@@ -334,7 +376,9 @@ fn layer(properties: &Properties) -> Layer {
 
 /// Values of the axes that have no curve.
 fn constants(properties: &Properties) -> [Option<f64>; 3] {
-    ["d|X", "d|Y", "d|Z"].map(|name| properties.real(name))
+    let real = |name| properties.real(name);
+    [["d|X", "X"], ["d|Y", "Y"], ["d|Z", "Z"]]
+        .map(|names| real(names[0]).or_else(|| real(names[1])))
 }
 
 /// Curves of the three axes of an `AnimationCurveNode`.
@@ -346,12 +390,12 @@ fn axes(
     let mut axes = [None; 3];
     for link in graph.children(curve_node, "AnimationCurve") {
         let axis = match link.property {
-            Some(b"d|Y") => 1,
-            Some(b"d|Z") => 2,
+            Some(b"d|Y" | b"Y") => 1,
+            Some(b"d|Z" | b"Z") => 2,
             Some(_) => 0,
             None => continue,
         };
-        axes[axis] = curves.share(&graph.objects[link.child], link.child)?;
+        axes[axis] = curves.load(&graph.objects[link.child], link.child)?;
     }
     Ok(axes)
 }

@@ -23,6 +23,8 @@ mod hostile;
 mod rewritten;
 #[cfg(test)]
 mod synthetic;
+mod made;
+#[cfg(test)]
 
 use crate::clip::{Problem, Severity};
 use crate::import::scene::{Node, Scene, Take};
@@ -39,7 +41,7 @@ use transform::World;
 /// Why a file can't be read as FBX.
 #[derive(Debug, thiserror::Error)]
 pub enum FbxError {
-    #[error("not an FBX file")]
+    #[error("not an FBX file; check that it was downloaded whole, and what wrote it")]
     NotFbx,
     #[error("ASCII FBX isn't supported; save as binary FBX 7.4 or newer")]
     Ascii,
@@ -55,6 +57,19 @@ pub enum FbxError {
 fn in_range(value: f64) -> bool {
     value.abs() < 1e12
 }
+impl FbxError {
+    /// The same error with what its place belongs to.
+    fn within(self, outer: &str) -> Self {
+        match self {
+            Self::Broken { place, reason } => Self::Broken {
+                place: format!("{outer}, {place}"),
+                reason,
+            },
+            other => other,
+        }
+    }
+}
+
 
 /// A parsed FBX file.
 pub(crate) struct FbxScene {
@@ -84,6 +99,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
         let object = &graph.objects[stack];
         let ticks = settings.ticks;
         let properties = templates.properties(object.record);
+    let spans = takes::spans(&document);
         let take = takes::take(
             &object.name,
             &properties,
@@ -92,7 +108,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
             ticks,
             settings.fps,
         );
-        problems.extend(takes::problems(&take, &animation, &curves.list, ticks));
+            spans.get(&object.name),
         takes.push(take);
         animations.push(animation);
     }

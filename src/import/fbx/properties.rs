@@ -7,9 +7,12 @@ use std::collections::BTreeMap;
 /// Name, type, label and flags stand before a property's values.
 const VALUES_AT: usize = 4;
 
+/// The values of a template's properties by their names.
+type Template<'d, 'a> = BTreeMap<&'a [u8], &'d [Value<'a>]>;
+
 /// Property templates by class of object.
 pub(super) struct Templates<'d, 'a> {
-    by_class: BTreeMap<&'a [u8], &'d Element<'a>>,
+    by_class: BTreeMap<&'a [u8], Template<'d, 'a>>,
 }
 
 impl<'d, 'a> Templates<'d, 'a> {
@@ -23,29 +26,40 @@ impl<'d, 'a> Templates<'d, 'a> {
                 .child("PropertyTemplate")
                 .and_then(|template| template.child("Properties70"));
             if let (Some(class), Some(template)) = (kind.text(0), template) {
-                by_class.entry(class).or_insert(template);
+                by_class.entry(class).or_insert_with(|| index(template));
             }
         }
         Self { by_class }
     }
 
     /// The properties of `object`, a record of class `object.name`.
-    pub fn properties(&self, object: &'d Element<'a>) -> Properties<'d, 'a> {
+    pub fn properties<'s>(&'s self, object: &'d Element<'a>) -> Properties<'s, 'd, 'a> {
         Properties {
             own: object.child("Properties70"),
-            template: self.by_class.get(object.name).copied(),
+            template: self.by_class.get(object.name),
         }
     }
 }
 
-/// An object's own properties over those of its template.
-#[derive(Clone, Copy)]
-pub(super) struct Properties<'d, 'a> {
-    own: Option<&'d Element<'a>>,
-    template: Option<&'d Element<'a>>,
+/// The first of properties of one name counts.
+fn index<'d, 'a>(list: &'d Element<'a>) -> Template<'d, 'a> {
+    let mut index = Template::new();
+    for property in &list.children {
+        if let (Some(name), Some(values)) = (property.text(0), property.values.get(VALUES_AT..)) {
+            index.entry(name).or_insert(values);
+        }
+    }
+    index
 }
 
-impl<'d, 'a> Properties<'d, 'a> {
+/// An object's own properties over those of its template.
+#[derive(Clone, Copy)]
+pub(super) struct Properties<'s, 'd, 'a> {
+    own: Option<&'d Element<'a>>,
+    template: Option<&'s Template<'d, 'a>>,
+}
+
+impl<'d, 'a> Properties<'_, 'd, 'a> {
     pub fn of(record: &'d Element<'a>) -> Self {
         Self {
             own: record.child("Properties70"),
@@ -61,9 +75,8 @@ impl<'d, 'a> Properties<'d, 'a> {
                 .find(|p| p.text(0) == Some(name.as_bytes()))?;
             property.values.get(VALUES_AT..)
         };
-        self.own
-            .and_then(find)
-            .or_else(|| self.template.and_then(find))
+        let template = || self.template?.get(name.as_bytes()).copied();
+        self.own.and_then(find).or_else(template)
     }
 
     pub fn int(&self, name: &str) -> Option<i64> {

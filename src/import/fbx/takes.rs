@@ -1,6 +1,7 @@
 //! Takes: their time span, frame rate, and what they move.
 
 use super::curve::Curve;
+use super::document::{Document, Element};
 use super::layers::Animation;
 use super::properties::Properties;
 use crate::clip::{Problem, Severity};
@@ -11,31 +12,62 @@ use std::collections::BTreeMap;
 const MAX_SECONDS: f64 = 6.0 * 3600.0;
 const FALLBACK_FPS: f64 = 30.0;
 
-/// Makes the take `name` of an animation. `fps` is what the file states; `ticks` is ticks per second.
+/// Start and stop that the file's list of takes states, in ticks: the take's own and its reference.
+#[derive(Default)]
+pub(super) struct Span {
+    local: Option<(i64, i64)>,
+    reference: Option<(i64, i64)>,
+}
+
+/// The list of takes, by name. Old writers state times only there.
+pub(super) fn spans(document: &Document) -> BTreeMap<String, Span> {
+    let list = document
+        .record("Takes")
+        .map_or(&[][..], |list| &list.children);
+    let span = |take: &Element| {
+        let times = |name| {
+            let times = take.child(name)?;
+            Some((times.int(0)?, times.int(1)?))
+        };
+        let name = String::from_utf8_lossy(take.text(0)?).into_owned();
+        let (local, reference) = (times("LocalTime"), times("ReferenceTime"));
+        Some((name, Span { local, reference }))
+    };
+    let takes = list.iter().filter(|take| take.name == b"Take");
+    takes.filter_map(span).collect()
+}
+
+/// Makes the take `name` of an animation. `listed` is what the file's list of takes says of it. `fps` is what the file states; `ticks` is ticks per second.
 pub(super) fn take(
     name: &str,
     properties: &Properties,
+    listed: Option<&Span>,
     animation: &Animation,
     curves: &[Curve],
     ticks: f64,
     fps: Option<f64>,
 ) -> Take {
     let keyed = key_range(animation, curves);
-    let (start, end) = span(properties, keyed, ticks);
+    let (start, end) = span(properties, listed, keyed, ticks);
     let moves = |node: &usize| {
         let mut own = curves_of(animation, *node, curves);
         own.any(|curve| curve.varies((start * ticks).round(), (end * ticks).round()))
     };
     let animated = animation.nodes().filter(moves).collect();
     let fps = fps.unwrap_or_else(|| spacing_fps(animation, curves, ticks).unwrap_or(FALLBACK_FPS));
-    Take {
+    let mut take = Take {
         name: name.into(),
         start,
         end,
         fps,
         animated,
         wraps: None,
-    }
+        channels: animation.size(),
+        problems: Vec::new(),
+        fault: None,
+    };
+    take.problems = problems(&take, animation, curves, ticks);
+    take
 }
 
 fn curves_of<'a>(
@@ -67,15 +99,26 @@ fn key_range(animation: &Animation, curves: &[Curve]) -> Option<(f64, f64)> {
 }
 
 /// Start and end in seconds: the take's own span, else its reference span, else that of its keys.
-fn span(properties: &Properties, keyed: Option<(f64, f64)>, ticks: f64) -> (f64, f64) {
-    let stated = |start, stop| {
-        let start = properties.int(start).unwrap_or(0) as f64 / ticks;
-        let stop = properties.int(stop)? as f64 / ticks;
+fn span(
+    properties: &Properties,
+    listed: Option<&Span>,
+    keyed: Option<(f64, f64)>,
+    ticks: f64,
+) -> (f64, f64) {
+    let stated = |start, stop, listed: Option<(i64, i64)>| {
+        let own = properties.int(stop);
+        let own = own.map(|stop| (properties.int(start).unwrap_or(0), stop));
+        let (start, stop) = own.or(listed)?;
+        let (start, stop) = (start as f64 / ticks, stop as f64 / ticks);
         (stop > start).then_some((start, stop))
     };
     let spans = [
-        stated("LocalStart", "LocalStop"),
-        stated("ReferenceStart", "ReferenceStop"),
+        stated("LocalStart", "LocalStop", listed.and_then(|s| s.local)),
+        stated(
+            "ReferenceStart",
+            "ReferenceStop",
+            listed.and_then(|s| s.reference),
+        ),
         keyed.map(|(first, last)| (first / ticks, last / ticks)),
     ];
     let sane = |&(start, end): &(f64, f64)| end - start <= MAX_SECONDS;
@@ -107,12 +150,7 @@ fn spacing_fps(animation: &Animation, curves: &[Curve], ticks: f64) -> Option<f6
 }
 
 /// What a take's owner should know about it.
-pub(super) fn problems(
-    take: &Take,
-    animation: &Animation,
-    curves: &[Curve],
-    ticks: f64,
-) -> Vec<Problem> {
+fn problems(take: &Take, animation: &Animation, curves: &[Curve], ticks: f64) -> Vec<Problem> {
     let mut problems = Vec::new();
     let mut note = |id: &str, message| {
         problems.push(Problem {
@@ -121,6 +159,18 @@ pub(super) fn problems(
             message,
         });
     };
+    if all_curves(animation, curves).any(|curve| curve.mended) {
+        let message = format!(
+            "take `{}` has curves with keys out of order or without a finite value",
+            take.name
+        );
+        note("mended-curves", message);
+    }
+    if animation.silent() > 0 {
+        let (silent, name) = (animation.silent(), &take.name);
+        let message = format!("take `{name}` has {silent} muted layers, which are left out");
+        note("muted-layers", message);
+    }
     if take.animated.is_empty() {
         note("empty-take", format!("take `{}` moves nothing", take.name));
     }

@@ -49,6 +49,11 @@ impl<'a> Accessors<'a> {
         }
     }
 
+    /// Bytes that were read from other files.
+    pub fn bytes_beside(&self) -> usize {
+        self.buffers.bytes_beside()
+    }
+
     /// Whether the file has this accessor and nothing is in it.
     pub fn is_empty(&self, accessor: Index<Accessor>) -> bool {
         self.document

@@ -16,6 +16,9 @@ pub(super) struct Buffers<'a> {
     folder: Option<&'a Path>,
     fetched: BTreeMap<usize, Cow<'a, [u8]>>,
     external_bytes: u64,
+    /// Bytes fetched: all, and those from other files.
+    bytes: usize,
+    bytes_beside: usize,
 }
 
 impl<'a> Buffers<'a> {
@@ -26,6 +29,8 @@ impl<'a> Buffers<'a> {
             folder,
             fetched: BTreeMap::new(),
             external_bytes: 0,
+            bytes: 0,
+            bytes_beside: 0,
         }
     }
 
@@ -35,6 +40,7 @@ impl<'a> Buffers<'a> {
             let bytes = self
                 .fetch(buffer)
                 .map_err(|reason| GltfError::Buffer { buffer, reason })?;
+            self.bytes = self.bytes.saturating_add(bytes.len());
             self.fetched.insert(buffer, bytes);
         }
         Ok(self.fetched.get(&buffer).map_or(&[], |bytes| bytes))
@@ -42,7 +48,12 @@ impl<'a> Buffers<'a> {
 
     /// How many bytes have been fetched.
     pub fn bytes(&self) -> usize {
-        self.fetched.values().map(|bytes| bytes.len()).sum()
+        self.bytes
+    }
+
+    /// How many of them came from other files.
+    pub fn bytes_beside(&self) -> usize {
+        self.bytes_beside
     }
 
     fn fetch(&mut self, buffer: usize) -> Result<Cow<'a, [u8]>, String> {
@@ -65,7 +76,7 @@ impl<'a> Buffers<'a> {
     fn read_beside(&mut self, uri: &str) -> Result<Vec<u8>, String> {
         let folder = self
             .folder
-            .ok_or("it lies in another file, which isn't at hand")?;
+            .ok_or("it lies in another file, which isn't at hand; put both into one folder, or save as GLB")?;
         let folder = if folder.as_os_str().is_empty() {
             Path::new(".")
         } else {
@@ -84,7 +95,9 @@ impl<'a> Buffers<'a> {
                 "the file's buffers are larger than {MOST_BYTES} bytes; split the file"
             ));
         }
-        std::fs::read(&path).map_err(missing)
+        let bytes = std::fs::read(&path).map_err(missing)?;
+        self.bytes_beside = self.bytes_beside.saturating_add(bytes.len());
+        Ok(bytes)
     }
 }
 

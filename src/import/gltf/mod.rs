@@ -41,6 +41,7 @@ pub(crate) struct GltfScene {
     curves: Vec<Curves>,
     problems: Vec<Problem>,
 }
+    bytes_beside: usize,
 
 /// Reads a GLB file.
 pub(crate) fn read_glb(bytes: &[u8], folder: Option<&Path>) -> Result<GltfScene, GltfError> {
@@ -67,8 +68,8 @@ fn scene(
             .name
             .clone()
             .unwrap_or_else(|| format!("take {}", number + 1));
-        let found = take::curves(animation, &name, &tree, &mut accessors, &mut problems)?;
-        takes.push(found.take(name));
+        let (found, take) = take::read(animation, name, &tree, &mut accessors);
+        takes.push(take);
         curves.push(found);
     }
     let bound = bind::pose(document, &tree, &mut accessors);
@@ -83,6 +84,7 @@ fn scene(
     })
 }
 
+        bytes_beside: accessors.bytes_beside(),
 fn posed_nodes() -> Problem {
     Problem {
         id: "rest-from-bind-pose".to_owned(),
@@ -156,6 +158,10 @@ impl Scene for GltfScene {
     }
 
     fn problems(&self) -> &[Problem] {
+
+    fn bytes_beside(&self) -> usize {
+        self.bytes_beside
+    }
         &self.problems
     }
 }

@@ -58,7 +58,7 @@ impl Curves {
     }
 
     /// The take over the time that its keys span.
-    pub fn take(&self, name: String) -> Take {
+    fn take(&self, name: String) -> Take {
         let times = || self.nodes.values().flat_map(NodeCurves::times);
         let start = times()
             .filter_map(<[f64]>::first)
@@ -78,12 +78,37 @@ impl Curves {
             fps: rate::rate(times()),
             animated: self.nodes.keys().copied().collect(),
             wraps: None,
+            channels: self.nodes.len(),
+            problems: Vec::new(),
+            fault: None,
         }
     }
 }
 
+/// Reads an animation: its curves and what is to be said of it. One that is broken moves nothing and says why, so that
+/// the others can be used.
+pub(super) fn read(
+    animation: &Animation,
+    name: String,
+    tree: &Tree,
+    accessors: &mut Accessors<'_>,
+) -> (Curves, Take) {
+    let mut problems = Vec::new();
+    let (curves, fault) = match curves(animation, &name, tree, accessors, &mut problems) {
+        Ok(curves) => (curves, None),
+        Err(e @ GltfError::Curve { .. }) => (Curves::default(), Some(e.to_string())),
+        Err(e) => (Curves::default(), Some(format!("take `{name}`: {e}"))),
+    };
+    let take = Take {
+        problems,
+        fault,
+        ..curves.take(name)
+    };
+    (curves, take)
+}
+
 /// Reads the curves of an animation. What can't move a joint (morph weights, pointers) is passed over.
-pub(super) fn curves(
+fn curves(
     animation: &Animation,
     take: &str,
     tree: &Tree,
@@ -91,6 +116,7 @@ pub(super) fn curves(
     problems: &mut Vec<Problem>,
 ) -> Result<Curves, GltfError> {
     let mut curves = Curves::default();
+    problems.extend(pointers(animation, take));
     for channel in &animation.channels {
         let Some(node) = channel.target.node else {
             continue;
@@ -108,7 +134,7 @@ pub(super) fn curves(
             .copied()
             .ok_or_else(|| GltfError::Tree {
                 node,
-                reason: format!("take `{take}` moves it, but it isn't in the file"),
+                reason: "it is moved, but it isn't in the file".to_owned(),
             })?;
         let name = &tree.nodes[place].name;
         let broken = |reason: String| GltfError::Curve {
@@ -179,6 +205,21 @@ fn interpolation(sampler: &Sampler) -> Result<Interpolation, String> {
         Checked::Valid(interpolation) => Ok(interpolation),
         Checked::Invalid => Err("an unknown interpolation".to_owned()),
     }
+}
+
+/// Curves of `KHR_animation_pointer`, whose targets are no nodes.
+fn pointers(animation: &Animation, take: &str) -> Option<Problem> {
+    let channels = animation.channels.iter();
+    let count = channels
+        .filter(|channel| channel.target.node.is_none())
+        .count();
+    (count > 0).then(|| Problem {
+        id: "pointer-curves-left-out".to_owned(),
+        severity: Severity::Note,
+        message: format!(
+            "take `{take}` has {count} curves that point to other things than a node's place, which aren't used; bake them to nodes if the motion looks wrong"
+        ),
+    })
 }
 
 /// A curve that isn't used.
