@@ -4,6 +4,7 @@
 //! and joints, canonical axes and metres, rigid transforms, sampling, loop detection.
 
 mod axes;
+mod bind;
 mod canonical;
 mod deepmimic;
 mod detect;
@@ -39,9 +40,9 @@ const MOST_BYTES: u64 = 2 << 30;
 /// but motion that fills them takes more.
 const FREE_TRANSFORMS: usize = 1 << 20;
 const TRANSFORMS_PER_BYTE: f64 = 0.5;
-
 /// Nodes or channels that may be looked at for each of these transforms: most of a file's nodes may be no joints.
 const LOOKS_PER_TRANSFORM: usize = 8;
+
 /// How a file is to be read, where it shouldn't decide itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
@@ -156,9 +157,9 @@ fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
     let first = default_take.map(|take| (take, scene.takes()[take].start));
     let rig = Rig::new(scene, file, frame(scene, file, &Options::default())?, first)?;
     let mut problems = scene.problems().to_vec();
-    problems.extend(rig.problems);
     problems.extend(scene.takes().iter().flat_map(|take| take.problems.clone()));
     problems.extend(scene.takes().iter().filter_map(broken_take));
+    problems.extend(rig.problems);
     if default_take.is_none() {
         problems.push(Problem {
             id: "no-takes".to_owned(),
@@ -177,7 +178,6 @@ fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
     })
 }
 
-fn take_info(take: &Take) -> TakeInfo {
 fn broken_take(take: &Take) -> Option<Problem> {
     Some(Problem {
         id: "broken-take".to_owned(),
@@ -186,10 +186,11 @@ fn broken_take(take: &Take) -> Option<Problem> {
     })
 }
 
+fn take_info(take: &Take) -> TakeInfo {
     let duration_s = take.end - take.start;
-    TakeInfo {
     // Keys may be farther apart than frames can be counted.
     let grid = Grid::new(duration_s, take.fps, usize::MAX);
+    TakeInfo {
         name: take.name.clone(),
         fps: take.fps,
         frames: grid.map_or(usize::MAX, |grid| grid.frames),
@@ -229,12 +230,12 @@ fn clip(
         Some((take, start)),
     )?;
     let fps = options.fps.unwrap_or(about.fps);
-    let grid = grid(scene, file, about, end - start, fps, most)?;
     let most = most_frames(scene, about, rig.joints.len(), most);
+    let grid = grid(scene, file, about, end - start, fps, most)?;
     let world = rig.frames(take, start, &grid)?;
     let mut problems = scene.problems().to_vec();
-    problems.extend(sampling_problems(&grid, fps, &world));
     problems.extend_from_slice(&about.problems);
+    problems.extend(sampling_problems(&grid, fps, &world));
     let wraps = match options.loop_mode {
         Some(mode) => mode == LoopMode::Wrap,
         None => about
@@ -289,7 +290,6 @@ fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<(f64, f64),
     Ok((take.start + start, take.start + end))
 }
 
-fn grid(
 /// Most frames that a take may be sampled to, given the most `transforms`: what is kept are the joints, but the time
 /// goes to all nodes and channels.
 fn most_frames(scene: &dyn Scene, take: &Take, joints: usize, transforms: usize) -> usize {
@@ -299,6 +299,7 @@ fn most_frames(scene: &dyn Scene, take: &Take, joints: usize, transforms: usize)
     kept.min(transforms.saturating_mul(LOOKS_PER_TRANSFORM) / looks.max(1))
 }
 
+fn grid(
     scene: &dyn Scene,
     file: &str,
     take: &Take,
@@ -363,17 +364,6 @@ fn bytes_of(path: &Path, file: &str) -> Result<Vec<u8>, Error> {
     std::fs::read(path).map_err(io)
 }
 
-fn file_name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-        .into_owned()
-}
-
-fn stem(file: &str) -> &str {
-    file.rsplit_once('.')
-        .map_or(file, |(stem, _)| if stem.is_empty() { file } else { stem })
-}
 /// A list of at most eight items, and how many more there are.
 fn few(items: impl ExactSizeIterator<Item = String>) -> String {
     const MOST: usize = 8;
@@ -385,3 +375,14 @@ fn few(items: impl ExactSizeIterator<Item = String>) -> String {
     }
 }
 
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn stem(file: &str) -> &str {
+    file.rsplit_once('.')
+        .map_or(file, |(stem, _)| if stem.is_empty() { file } else { stem })
+}

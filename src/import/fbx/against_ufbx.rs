@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
-const TOLERANCE_M: f64 = 1e-4;
+pub(super) const TOLERANCE_M: f64 = 1e-4;
 /// Of the farthest node's distance from the origin: ufbx keeps tangents as f32, and blending
 /// Euler angles near a pole magnifies the difference. It exceeds `TOLERANCE_M` only beyond ten metres.
-const TOLERANCE_FAR: f64 = 1e-5;
+pub(super) const TOLERANCE_FAR: f64 = 1e-5;
 const TOLERANCE_LINEAR: f64 = 1e-5;
 
 /// Matrices of a file's nodes by their path and, where paths repeat, by the order of the nodes in the file.
@@ -27,16 +27,20 @@ fn collect(nodes: impl Iterator<Item = (String, Matrix4<f64>)>) -> Worlds {
     keyed.collect()
 }
 
-fn ours(scene: &FbxScene, at: Option<(usize, f64)>) -> Worlds {
+pub(super) fn ours(scene: &FbxScene, at: Option<(usize, f64)>) -> Worlds {
+    ours_by(scene, scene.placed(at))
+}
+
+pub(super) fn ours_by(scene: &FbxScene, world: Vec<Matrix4<f64>>) -> Worlds {
     let mut paths: Vec<String> = Vec::new();
     for node in scene.nodes() {
         let parent = node.parent.map_or("", |parent| paths[parent].as_str());
         paths.push(format!("{parent}/{}", node.name));
     }
-    collect(paths.into_iter().zip(scene.world(at)))
+    collect(paths.into_iter().zip(world))
 }
 
-fn path(node: &ufbx::Node) -> String {
+pub(super) fn path(node: &ufbx::Node) -> String {
     let parent = node
         .parent
         .as_ref()
@@ -45,7 +49,7 @@ fn path(node: &ufbx::Node) -> String {
     format!("{parent}/{}", &*node.element.name)
 }
 
-fn theirs(scene: &ufbx::Scene) -> Worlds {
+pub(super) fn theirs(scene: &ufbx::Scene) -> Worlds {
     let mut nodes: Vec<&ufbx::Node> = scene
         .nodes
         .into_iter()
@@ -60,7 +64,7 @@ fn theirs(scene: &ufbx::Scene) -> Worlds {
 }
 
 #[rustfmt::skip]
-fn matrix(m: &ufbx::Matrix) -> Matrix4<f64> {
+pub(super) fn matrix(m: &ufbx::Matrix) -> Matrix4<f64> {
     Matrix4::new(
         m.m00, m.m01, m.m02, m.m03,
         m.m10, m.m11, m.m12, m.m13,
@@ -97,16 +101,23 @@ fn compare(ours: &Worlds, theirs: &Worlds, unit_m: f64, place: &str) -> (f64, f6
     worst
 }
 
-/// A file as we and as ufbx read it.
-fn open(file: &str) -> Option<(FbxScene, ufbx::SceneRoot)> {
+/// A file's bytes, and what they are in binary form.
+pub(super) fn bytes_of(file: &str) -> Option<(Vec<u8>, Vec<u8>)> {
     let Ok(bytes) = std::fs::read(Path::new(DATA).join(file)) else {
         eprintln!("skipped: {file} isn't there");
         return None;
     };
-    let scene = match read(&bytes) {
-        Err(FbxError::Ascii) => read(&as_binary(&bytes)),
-        scene => scene,
+    let binary = match read(&bytes) {
+        Err(FbxError::Ascii) => as_binary(&bytes),
+        _ => bytes.clone(),
     };
+    Some((bytes, binary))
+}
+
+/// A file as we and as ufbx read it.
+pub(super) fn open(file: &str) -> Option<(FbxScene, ufbx::SceneRoot)> {
+    let (bytes, binary) = bytes_of(file)?;
+    let scene = read(&binary);
     let options = ufbx::LoadOpts {
         ignore_geometry: true,
         ..Default::default()
@@ -186,8 +197,10 @@ fn check(file: &str) {
             frames += 1;
         }
     }
+    let clips = super::clips_against_ufbx::check(file, &scene, &oracle);
     eprintln!(
-        "{file}: {} nodes, {frames} frames, {:.2e} mm, axes {:.2e}",
+        "{file}: clips {:.2e} mm, {} nodes, {frames} frames, {:.2e} mm, axes {:.2e}",
+        clips * 1e3,
         scene.nodes().len(),
         worst.0 * 1e3,
         worst.1
@@ -207,12 +220,8 @@ fn torture_maya_long_keyframes() {
             stack.time_begin + (stack.time_end - stack.time_begin) * f64::from(sample) / 5000.0;
         check_moment(&scene, &oracle, 0, time, &format!("{file}, {time} s"));
     }
-    assert!(
-        scene
-            .problems()
-            .iter()
-            .any(|problem| problem.id == "cut-take")
-    );
+    let problems = &scene.takes()[0].problems;
+    assert!(problems.iter().any(|problem| problem.id == "cut-take"));
 }
 
 /// Extrapolation and the time between frames: each take sampled at odd times, from before its start to after its end.

@@ -1,6 +1,7 @@
 //! FBX, binary, versions 7.0 to 7.9.
 
 mod array;
+mod bind;
 mod curve;
 mod document;
 mod keys;
@@ -18,15 +19,18 @@ mod transform;
 #[cfg(test)]
 mod against_ufbx;
 #[cfg(test)]
+mod clips_against_ufbx;
+#[cfg(test)]
 mod hostile;
+#[cfg(test)]
+mod made;
 #[cfg(test)]
 mod rewritten;
 #[cfg(test)]
 mod synthetic;
-mod made;
-#[cfg(test)]
 
 use crate::clip::{Problem, Severity};
+use crate::import::bind::{Binds, Stand, pose};
 use crate::import::scene::{Node, Scene, Take};
 use curve::Curve;
 use document::Document;
@@ -53,10 +57,6 @@ pub enum FbxError {
     Broken { place: String, reason: String },
 }
 
-/// Whether a number of the file is finite and small enough for arithmetic with it to stay so.
-fn in_range(value: f64) -> bool {
-    value.abs() < 1e12
-}
 impl FbxError {
     /// The same error with what its place belongs to.
     fn within(self, outer: &str) -> Self {
@@ -70,6 +70,10 @@ impl FbxError {
     }
 }
 
+/// Whether a number of the file is finite and small enough for arithmetic with it to stay so.
+fn in_range(value: f64) -> bool {
+    value.abs() < 1e12
+}
 
 /// A parsed FBX file.
 pub(crate) struct FbxScene {
@@ -79,6 +83,8 @@ pub(crate) struct FbxScene {
     /// One per take.
     animations: Vec<Animation>,
     curves: Vec<Curve>,
+    /// World matrices at rest, where that isn't how the nodes stand.
+    bound: Option<Vec<Matrix4<f64>>>,
     settings: Settings,
     problems: Vec<Problem>,
 }
@@ -93,42 +99,86 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     let mut curves = Curves::new(settings.ticks, document.budget, graph.links());
     let mut problems = settings.problems.clone();
     problems.extend(graph_problems(&graph, &tree));
+    let spans = takes::spans(&document);
     let (mut takes, mut animations) = (Vec::new(), Vec::new());
     for stack in graph.of_class("AnimationStack") {
         let animation = Animation::read(&graph, stack, &templates, &tree, &mut curves)?;
         let object = &graph.objects[stack];
         let ticks = settings.ticks;
         let properties = templates.properties(object.record);
-    let spans = takes::spans(&document);
         let take = takes::take(
             &object.name,
             &properties,
+            spans.get(&object.name),
             &animation,
             &curves.list,
             ticks,
             settings.fps,
         );
-            spans.get(&object.name),
         takes.push(take);
         animations.push(animation);
     }
     let curves = curves.list;
-    if curves.iter().any(|curve| curve.mended) {
-        problems.push(warning(
-            "mended-curves",
-            "some curves had keys out of order or without a finite value",
-        ));
-    }
+    let binds = bind::binds(&graph, &tree, document.budget);
     let Tree { nodes, rigs, .. } = tree;
-    Ok(FbxScene {
+    let mut scene = FbxScene {
         nodes,
         rigs,
         takes,
         animations,
         curves,
+        bound: None,
         settings,
         problems,
-    })
+    };
+    scene.rest_in(binds);
+    Ok(scene)
+}
+
+impl FbxScene {
+    /// Takes a bind pose as the rest pose, where the nodes stand in another. A root keeps its heading: bind poses are
+    /// often kept in the axes of the tool that the character was modelled in.
+    fn rest_in(&mut self, binds: Vec<Binds>) {
+        if binds.is_empty() {
+            return;
+        }
+        let up = self.settings.canonical_from_file.row(2).transpose();
+        let stand = Stand {
+            nodes: &self.nodes,
+            world: &self.placed(None),
+            up: Some(up),
+        };
+        if let Some((world, problem)) = pose(&stand, binds.into_iter()) {
+            self.bound = Some(world);
+            self.problems.push(problem);
+        }
+    }
+
+    /// World matrices of all nodes at `at`, or as they stand in the file.
+    ///
+    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let moment = at.and_then(|(take, time)| {
+            let animation = self.animations.get(take)?;
+            let tick = (time * self.settings.ticks).round();
+            Some((animation, tick, animation.weights(&self.curves, tick)))
+        });
+        let mut worlds: Vec<World> = Vec::with_capacity(self.nodes.len());
+        for (index, (node, rig)) in self.nodes.iter().zip(&self.rigs).enumerate() {
+            let pose = match &moment {
+                Some((animation, tick, weights)) => {
+                    animation.pose(index, rig, &self.curves, weights, *tick)
+                }
+                None => rig.rest,
+            };
+            let parent = node
+                .parent
+                .and_then(|parent| worlds.get(parent).copied())
+                .unwrap_or_else(World::root);
+            worlds.push(parent.child(&pose, &rig.rules));
+        }
+        worlds.iter().map(World::matrix).collect()
+    }
 }
 
 fn warning(id: &str, message: &str) -> Problem {
@@ -179,28 +229,11 @@ impl Scene for FbxScene {
         self.settings.canonical_from_file
     }
 
-    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
     fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        let moment = at.and_then(|(take, time)| {
-            let animation = self.animations.get(take)?;
-            let tick = (time * self.settings.ticks).round();
-            Some((animation, tick, animation.weights(&self.curves, tick)))
-        });
-        let mut worlds: Vec<World> = Vec::with_capacity(self.nodes.len());
-        for (index, (node, rig)) in self.nodes.iter().zip(&self.rigs).enumerate() {
-            let pose = match &moment {
-                Some((animation, tick, weights)) => {
-                    animation.pose(index, rig, &self.curves, weights, *tick)
-                }
-                None => rig.rest,
-            };
-            let parent = node
-                .parent
-                .and_then(|parent| worlds.get(parent).copied())
-                .unwrap_or_else(World::root);
-            worlds.push(parent.child(&pose, &rig.rules));
+        match (at, &self.bound) {
+            (None, Some(bound)) => bound.clone(),
+            _ => self.placed(at),
         }
-        worlds.iter().map(World::matrix).collect()
     }
 
     fn problems(&self) -> &[Problem] {

@@ -33,6 +33,7 @@ pub(super) struct Graph<'d, 'a> {
     children: Vec<Vec<Link<'a>>>,
     /// Connections to the object's parents, in file order.
     parents: Vec<Vec<Link<'a>>>,
+    by_id: BTreeMap<i64, usize>,
 }
 
 impl<'d, 'a> Graph<'d, 'a> {
@@ -59,18 +60,19 @@ impl<'d, 'a> Graph<'d, 'a> {
             children: vec![Vec::new(); objects.len()],
             parents: vec![Vec::new(); objects.len()],
             objects,
+            by_id,
         };
         for record in document
             .record("Connections")
             .map_or(&[][..], |record| &record.children)
         {
-            graph.connect(record, &by_id);
+            graph.connect(record);
         }
         graph
     }
 
-    fn connect(&mut self, record: &Element<'a>, by_id: &BTreeMap<i64, usize>) {
-        let object = |index| record.int(index).and_then(|id| by_id.get(&id).copied());
+    fn connect(&mut self, record: &Element<'a>) {
+        let object = |index| record.int(index).and_then(|id| self.with_id(id));
         let (Some(child), Some(parent)) = (object(1), object(2)) else {
             return;
         };
@@ -86,6 +88,11 @@ impl<'d, 'a> Graph<'d, 'a> {
         };
         self.children[parent].push(link);
         self.parents[child].push(link);
+    }
+
+    /// The object of this id.
+    pub fn with_id(&self, id: i64) -> Option<usize> {
+        self.by_id.get(&id).copied()
     }
 
     /// Connections of `object` to children of class `class`.

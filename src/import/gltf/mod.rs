@@ -16,6 +16,7 @@ pub use error::GltfError;
 use super::scene::{Node, Scene, Take};
 use crate::clip::{Problem, Severity};
 use crate::import::axes::UpAxis;
+use crate::import::bind::{Stand, pose};
 use accessor::Accessors;
 use buffer::Buffers;
 use document::Document;
@@ -35,8 +36,8 @@ const HARMLESS: [&str; 4] = [
 /// A glTF file's nodes and animations.
 pub(crate) struct GltfScene {
     tree: Tree,
-    /// Nodes that stand elsewhere in their parents in the pose that their skin was bound in.
-    bound: Vec<Option<Matrix4<f64>>>,
+    /// World matrices at rest, where that isn't how the nodes stand.
+    bound: Option<Vec<Matrix4<f64>>>,
     takes: Vec<Take>,
     curves: Vec<Curves>,
     problems: Vec<Problem>,
@@ -72,9 +73,16 @@ fn scene(
         takes.push(take);
         curves.push(found);
     }
-    let bound = bind::pose(document, &tree, &mut accessors);
-    problems.extend(bound.is_some().then(posed_nodes));
-    let bound = bound.unwrap_or_default();
+    let stand = Stand {
+        nodes: &tree.nodes,
+        world: &tree.rest_world(),
+        up: None,
+    };
+    let bound = pose(&stand, bind::binds(document, &tree, &mut accessors));
+    let bound = bound.map(|(world, problem)| {
+        problems.push(problem);
+        world
+    });
     Ok(GltfScene {
         bound,
         tree,
@@ -137,21 +145,15 @@ impl Scene for GltfScene {
     }
 
     fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        let moved = at.and_then(|(take, time)| Some((self.curves.get(take)?, time)));
+        let Some((curves, time)) = at.and_then(|(take, time)| Some((self.curves.get(take)?, time)))
+        else {
+            let stand = || self.tree.rest_world();
+            return self.bound.clone().unwrap_or_else(stand);
+        };
         let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(self.tree.nodes.len());
         for (at, (node, rest)) in self.tree.nodes.iter().zip(&self.tree.rest).enumerate() {
-            let bound = || {
-                self.bound
-                    .get(at)
-                    .copied()
-                    .flatten()
-                    .filter(|_| moved.is_none())
-            };
-            let local = moved
-                .and_then(|(curves, time)| curves.placement(at, &rest.placement, time))
-                .map(|placement| placement.matrix())
-                .or_else(bound)
-                .unwrap_or_else(|| rest.matrix());
+            let placement = curves.placement(at, &rest.placement, time);
+            let local = placement.map_or_else(|| rest.matrix(), |placement| placement.matrix());
             world.push(node.parent.map_or(local, |parent| world[parent] * local));
         }
         world
