@@ -72,8 +72,32 @@ fn deepmimic() -> Vec<u8> {
     .into_bytes()
 }
 
+/// Looks at `bytes` in a file and checks what that cost, and that what is told of takes can be meant.
+fn inspected(name: &str, bytes: &[u8]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("file");
+    std::fs::write(&path, bytes).expect("it is written");
+    let start = Instant::now();
+    let (look, peak) = HEAP.peak_of(|| import::inspect(&path));
+    let seconds = start.elapsed();
+    assert!(seconds < SOON, "{name}: {seconds:?}");
+    let most = PER_BYTE * bytes.len() + CONSTANT;
+    assert!(peak < most, "{name}: {peak} bytes for {}", bytes.len());
+    for take in look.iter().flat_map(|look| &look.takes) {
+        assert!((1.0..=10_000.0).contains(&take.fps), "{name}: {take:?}");
+        assert!(
+            (0.0..f64::INFINITY).contains(&take.duration_s),
+            "{name}: {take:?}"
+        );
+        // Two frames of any motion, one of none; a count that overflowed would be less than the seconds.
+        let least = take.duration_s.min(1e15) as usize;
+        assert!(take.frames > least, "{name}: {take:?}");
+    }
+}
+
 /// Reads `bytes` and checks what that cost; whether they could be read.
 fn frugal(name: &str, bytes: &[u8]) -> Result<usize, Error> {
+    inspected(name, bytes);
     let start = Instant::now();
     let (clip, peak) = HEAP.peak_of(|| import::read(bytes, name, None, &Options::default()));
     let seconds = start.elapsed();
@@ -129,6 +153,36 @@ fn many_zeros() -> Vec<u8> {
         .to_vec()
 }
 
+/// A glTF file of these nodes, skins and takes, whose accessors are zeros.
+fn gltf(nodes: &str, skins: &str, takes: &str) -> Vec<u8> {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],"skins":[{skins}],"animations":[{takes}],
+        "buffers":[{{"byteLength":8,"uri":"data:;base64,AAAAAAAAyEc="}}],
+        "bufferViews":[{{"buffer":0,"byteLength":8}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR"}},
+        {{"componentType":5126,"count":2,"type":"VEC3"}},{{"componentType":5126,"count":1,"type":"MAT4"}}]}}"#
+    )
+    .into_bytes()
+}
+
+/// Many skins of many nodes.
+fn many_skins() -> Vec<u8> {
+    let skin = r#"{"joints":[0],"inverseBindMatrices":2}"#;
+    let node = r#"{"name":"a node of some length"}"#;
+    gltf(&[node; 20_000].join(","), &[skin; 20_000].join(","), "")
+}
+
+/// A bone that moves for 28 hours among many meshes: its frames are few enough to keep, but all nodes have to be placed.
+fn long_take_of_many_meshes() -> Vec<u8> {
+    assert_eq!(102_400_f32.to_le_bytes(), [0, 0, 200, 71]);
+    let take = r#"{"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}],"samplers":[{"input":0,"output":1}]}"#;
+    let nodes = format!(
+        "{{}}{}",
+        r#",{"mesh":0,"name":"a mesh of some length"}"#.repeat(20_000)
+    );
+    gltf(&nodes, r#"{"joints":[0]}"#, take)
+}
+
 /// Appends an FBX 7.4 record whose values are integers or texts and whose children `inside` appends.
 fn record(
     out: &mut Vec<u8>,
@@ -167,12 +221,59 @@ fn record(
     out[start..start + 4].copy_from_slice(&end);
 }
 
-/// An FBX file of `stacks` takes that share one layer, which moves `models` models.
-fn shared_layer(stacks: i64, models: i64) -> Vec<u8> {
+/// An FBX file of these records.
+fn fbx(objects: impl FnOnce(&mut Vec<u8>), connections: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut out = b"Kaydara FBX Binary  \0\x1a\0".to_vec();
     out.extend(u32::to_le_bytes(7400));
+    objects(&mut out);
+    record(&mut out, "Connections", &[], &[], connections);
+    out.extend([0; 13]);
+    out
+}
+
+/// An FBX file in which one curve node has `many` curves and moves as many models.
+fn shared_curve_node(many: i64) -> Vec<u8> {
+    let (model, curve) = (|k| 1_000_000 + k, |k| 2_000_000 + k);
+    let objects = |out: &mut Vec<u8>| {
+        record(out, "AnimationStack", &[1], &["s", ""], |_| {});
+        record(out, "AnimationLayer", &[2], &["l", ""], |_| {});
+        record(out, "AnimationCurveNode", &[3], &["T", ""], |_| {});
+        for k in 0..many {
+            record(out, "Model", &[model(k)], &["m", "LimbNode"], |_| {});
+            record(out, "AnimationCurve", &[curve(k)], &["", ""], |_| {});
+        }
+    };
+    let connections = |out: &mut Vec<u8>| {
+        record(out, "C", &[2, 1], &["OO"], |_| {});
+        record(out, "C", &[3, 2], &["OO"], |_| {});
+        for k in 0..many {
+            record(out, "C", &[3, model(k)], &["OP", "Lcl Translation"], |_| {});
+            record(out, "C", &[curve(k), 3], &["OP", "d|X"], |_| {});
+        }
+    };
+    fbx(|out| record(out, "Objects", &[], &[], objects), connections)
+}
+
+/// An FBX file of `many` models whose template has as many properties.
+fn long_template(many: i64) -> Vec<u8> {
+    let property = |out: &mut Vec<u8>| record(out, "P", &[], &["a name", "", "", ""], |_| {});
+    let properties = |out: &mut Vec<u8>| (0..many).for_each(|_| property(out));
+    let list = |out: &mut Vec<u8>| record(out, "Properties70", &[], &[], properties);
+    let template = |out: &mut Vec<u8>| record(out, "PropertyTemplate", &[], &[], list);
+    let kind = |out: &mut Vec<u8>| record(out, "ObjectType", &[], &["Model"], template);
+    let model = |out: &mut Vec<u8>, k| record(out, "Model", &[k], &["m", "LimbNode"], |_| {});
+    let models = |out: &mut Vec<u8>| (0..many).for_each(|k| model(out, k));
+    let records = |out: &mut Vec<u8>| {
+        record(out, "Definitions", &[], &[], kind);
+        record(out, "Objects", &[], &[], models);
+    };
+    fbx(records, |_| {})
+}
+
+/// An FBX file of `stacks` takes that share one layer, which moves `models` models.
+fn shared_layer(stacks: i64, models: i64) -> Vec<u8> {
     let (model, curve_node) = (|k| 1_000_000 + k, |k| 2_000_000 + k);
-    record(&mut out, "Objects", &[], &[], |out| {
+    let objects = |out: &mut Vec<u8>| {
         record(out, "AnimationLayer", &[0], &["l", ""], |_| {});
         for k in 1..=stacks {
             record(out, "AnimationStack", &[k], &["s", ""], |_| {});
@@ -187,8 +288,8 @@ fn shared_layer(stacks: i64, models: i64) -> Vec<u8> {
                 |_| {},
             );
         }
-    });
-    record(&mut out, "Connections", &[], &[], |out| {
+    };
+    let connections = |out: &mut Vec<u8>| {
         for k in 1..=stacks {
             record(out, "C", &[0, k], &["OO"], |_| {});
         }
@@ -197,9 +298,8 @@ fn shared_layer(stacks: i64, models: i64) -> Vec<u8> {
             let property = ["OP", "Lcl Translation"];
             record(out, "C", &[curve_node(k), model(k)], &property, |_| {});
         }
-    });
-    out.extend([0; 13]);
-    out
+    };
+    fbx(|out| record(out, "Objects", &[], &[], objects), connections)
 }
 
 #[test]
@@ -226,6 +326,10 @@ fn reading_costs_no_more_than_the_size_allows() {
         error.to_string()
     };
     assert!(refusal("zeros.gltf", &many_zeros()).contains("more than"));
+    assert!(refusal("skins.gltf", &many_skins()).contains("no animation"));
+    assert!(refusal("meshes.gltf", &long_take_of_many_meshes()).contains("--trim"));
+    assert!(frugal("curves.fbx", &shared_curve_node(20_000)).is_ok());
+    assert!(refusal("template.fbx", &long_template(20_000)).contains("no animation"));
     assert!(frugal("one.fbx", &shared_layer(1, 1000)).is_ok());
     assert!(refusal("shared.fbx", &shared_layer(4000, 1000)).contains("implausibly often"));
 }

@@ -4,6 +4,7 @@ mod beside;
 mod damage;
 mod deepmimic;
 mod gltf;
+mod gltf_kept;
 mod gltf_made;
 mod gltf_reference;
 mod robust;

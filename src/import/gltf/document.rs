@@ -7,24 +7,62 @@ use super::GltfError;
 use gltf::json::animation::{Property, Sampler};
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Accessor, Buffer, Index, Node, Skin, buffer};
-use serde::Deserialize;
-use serde::de::IgnoredAny;
-use serde_json::Value;
+use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
+use std::fmt;
+use std::marker::PhantomData;
 
 #[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document {
+    #[serde(deserialize_with = "bounded")]
     pub nodes: Vec<Node>,
+    #[serde(deserialize_with = "bounded")]
     pub skins: Vec<Skin>,
+    #[serde(deserialize_with = "bounded")]
     pub animations: Vec<Animation>,
+    #[serde(deserialize_with = "bounded")]
     pub accessors: Vec<Accessor>,
+    #[serde(deserialize_with = "bounded")]
     pub buffer_views: Vec<buffer::View>,
+    #[serde(deserialize_with = "bounded")]
     pub buffers: Vec<Buffer>,
     pub extensions_required: Vec<String>,
-    pub extensions: Extensions,
     #[serde(skip)]
     extended: Extended,
+    /// The extensions that name bones; `None` where they can't be read.
+    #[serde(skip)]
+    pub extensions: Option<Extensions>,
+}
+
+/// Most entries of a list. Three bytes of JSON can make one, which takes hundreds of bytes here.
+const MOST_ENTRIES: usize = 1 << 17;
+
+/// A list of at most [`MOST_ENTRIES`].
+fn bounded<'de, D: Deserializer<'de>, T: Deserialize<'de>>(list: D) -> Result<Vec<T>, D::Error> {
+    list.deserialize_seq(Bounded(PhantomData))
+}
+
+struct Bounded<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Bounded<T> {
+    type Value = Vec<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a list of at most {MOST_ENTRIES} entries")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<Vec<T>, A::Error> {
+        let mut list = Vec::new();
+        while let Some(entry) = entries.next_element()? {
+            if list.len() == MOST_ENTRIES {
+                return Err(A::Error::invalid_length(list.len() + 1, &self));
+            }
+            list.push(entry);
+        }
+        Ok(list)
+    }
 }
 
 /// An animation whose channels may lack a node, as those of extensions do; [`gltf::json::animation::Target`] wants one.
@@ -60,19 +98,25 @@ struct Extended {
 #[derive(Deserialize, Default)]
 #[serde(default)]
 struct Names {
-    extensions: BTreeMap<String, IgnoredAny>,
+    extensions: Option<BTreeMap<String, IgnoredAny>>,
+}
+
+impl Names {
+    fn iter(&self) -> impl Iterator<Item = &String> {
+        self.extensions.iter().flat_map(BTreeMap::keys)
+    }
 }
 
 impl Document {
     /// Whether an extension makes a light of this node.
     pub fn is_light(&self, node: usize) -> bool {
         let names = self.extended.nodes.get(node);
-        names.is_some_and(|names| names.extensions.contains_key("KHR_lights_punctual"))
+        names.is_some_and(|names| names.iter().any(|name| name == "KHR_lights_punctual"))
     }
 
     /// The extension that this buffer view's bytes are packed with.
     pub fn packing(&self, view: usize) -> Option<&str> {
-        let mut names = self.extended.buffer_views.get(view)?.extensions.keys();
+        let mut names = self.extended.buffer_views.get(view)?.iter();
         names
             .find(|name| name.contains("meshopt_compression"))
             .map(String::as_str)
@@ -82,6 +126,12 @@ impl Document {
 /// A size or offset; those that can't be addressed fit nowhere.
 pub(super) fn size(bytes: USize64) -> usize {
     usize::try_from(bytes.0).unwrap_or(usize::MAX)
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Extending {
+    extensions: Extensions,
 }
 
 /// The extensions that name bones: VRM models, old and new, and VRM animations.
@@ -123,18 +173,22 @@ impl Default for HumanBones {
 
 #[derive(Deserialize)]
 struct HumanBone {
-    node: usize,
+    /// −1 where the humanoid lacks the bone.
+    node: i64,
 }
 
 impl Extensions {
-    /// Nodes that are bones of a VRM humanoid.
+    /// Nodes that are bones of a VRM humanoid; the file may lack them.
     pub fn bones(&self) -> Vec<usize> {
         let all = [&self.vrm_0, &self.vrm_1, &self.vrm_animation];
         let nodes = |vrm: &&Vrm| match &vrm.humanoid.human_bones {
             HumanBones::List(bones) => bones.iter().map(|bone| bone.node).collect::<Vec<_>>(),
             HumanBones::Named(bones) => bones.values().map(|bone| bone.node).collect(),
         };
-        all.iter().flat_map(nodes).collect()
+        let nodes = all.iter().flat_map(nodes);
+        nodes
+            .filter_map(|node| usize::try_from(node).ok())
+            .collect()
     }
 }
 
@@ -156,30 +210,109 @@ pub(super) fn parse(json: &[u8]) -> Result<Document, GltfError> {
         return Err(GltfError::Version(stamp.asset.version));
     }
     let document: Document = serde_json::from_slice(json)
-        .or_else(|e| without_extras(json).ok_or(e))
+        .or_else(|e| serde_json::from_slice(&without_extras(json)).map_err(|_| e))
         .map_err(GltfError::Json)?;
     let extended = serde_json::from_slice(json).map_err(GltfError::Json)?;
+    let extending = serde_json::from_slice(json).ok();
     Ok(Document {
         extended,
+        extensions: extending.map(|Extending { extensions }| extensions),
         ..document
     })
 }
 
-/// The same without `extras`, which may be anything, but which [`gltf::json`] wants to be objects.
-fn without_extras(json: &[u8]) -> Option<Document> {
-    let mut value = serde_json::from_slice(json).ok()?;
-    drop_extras(&mut value);
-    serde_json::from_value(value).ok()
+/// The same with nothing in any `extras`, which may be anything, but which [`gltf::json`] wants to be objects.
+fn without_extras(json: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(json.len() + json.len() / 8);
+    let mut at = 0;
+    while at < json.len() {
+        let token = json.get(at..token_end(json, at)).unwrap_or_default();
+        at += token.len();
+        out.extend(token);
+        let rest = json.get(at..).unwrap_or_default();
+        let value = rest.trim_ascii_start().strip_prefix(b":");
+        if let (b"\"extras\"", Some(value)) = (token, value) {
+            out.extend(b":{}");
+            at = value_end(json, json.len() - value.len());
+        }
+    }
+    out
 }
 
-/// The parser bounds how deep values nest.
-fn drop_extras(value: &mut Value) {
-    match value {
-        Value::Array(items) => items.iter_mut().for_each(drop_extras),
-        Value::Object(entries) => {
-            entries.remove("extras");
-            entries.values_mut().for_each(drop_extras);
+/// End of the string or the single byte at `at`.
+fn token_end(json: &[u8], at: usize) -> usize {
+    let mut end = at + 1;
+    if json.get(at) == Some(&b'"') {
+        while let Some(byte) = json.get(end).filter(|byte| **byte != b'"') {
+            end += if *byte == b'\\' { 2 } else { 1 };
         }
-        _ => {}
+        end += 1;
+    }
+    end.min(json.len())
+}
+
+/// Where the value that begins at `at` has ended: at the comma or bracket after it.
+fn value_end(json: &[u8], mut at: usize) -> usize {
+    let mut depth = 0_usize;
+    while let Some(byte) = json.get(at) {
+        match byte {
+            b'{' | b'[' => depth += 1,
+            b'}' | b']' | b',' if depth == 0 => break,
+            b'}' | b']' => depth -= 1,
+            _ => {}
+        }
+        at = token_end(json, at);
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extras_of_any_kind_are_emptied() {
+        for (json, emptied) in [
+            (r#"{"extras":1}"#, r#"{"extras":{}}"#),
+            (
+                r#"{"extras" : "a\"},{", "b": 2}"#,
+                r#"{"extras":{}, "b": 2}"#,
+            ),
+            (
+                r#"[{"extras":[1,{"extras":null}]},"extras"]"#,
+                r#"[{"extras":{}},"extras"]"#,
+            ),
+            (r#"{"a":"\\","extras":{}}"#, r#"{"a":"\\","extras":{}}"#),
+        ] {
+            let found = without_extras(json.as_bytes());
+            assert_eq!(String::from_utf8_lossy(&found), emptied);
+        }
+        for cut in [
+            r#"{"extras":"#,
+            r#"{"extras":["#,
+            r#"{"extras":"\"#,
+            "\"",
+            "",
+        ] {
+            without_extras(cut.as_bytes());
+        }
+    }
+
+    #[test]
+    fn lists_have_a_bound() {
+        let nodes = |count: usize| {
+            format!(
+                "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{}]}}",
+                vec!["{}"; count].join(",")
+            )
+        };
+        assert!(parse(nodes(MOST_ENTRIES).as_bytes()).is_ok());
+        let error = parse(nodes(MOST_ENTRIES + 1).as_bytes())
+            .map(|_| ())
+            .expect_err("too many");
+        assert!(
+            error.to_string().contains("at most 131072 entries"),
+            "{error}"
+        );
     }
 }

@@ -9,9 +9,9 @@ pub enum GltfError {
     Version(String),
     #[error("{0}; export the GLB again")]
     Container(String),
-    #[error("buffer {buffer}: {reason}")]
+    #[error("buffer {buffer}: {reason}{}", remedy(reason))]
     Buffer { buffer: usize, reason: String },
-    #[error("accessor {accessor}: {reason}; export the file again")]
+    #[error("accessor {accessor}: {reason}{}", remedy(reason))]
     Accessor { accessor: usize, reason: String },
     #[error("take `{take}`, node `{node}`, {path}: {reason}; export the file again")]
     Curve {
@@ -22,4 +22,13 @@ pub enum GltfError {
     },
     #[error("node {node}: {reason}; export the file again")]
     Tree { node: usize, reason: String },
+}
+
+/// What to do, unless the reason says it.
+fn remedy(reason: &str) -> &'static str {
+    if reason.contains(';') {
+        ""
+    } else {
+        "; export the file again"
+    }
 }

@@ -41,8 +41,8 @@ pub(crate) struct GltfScene {
     takes: Vec<Take>,
     curves: Vec<Curves>,
     problems: Vec<Problem>,
-}
     bytes_beside: usize,
+}
 
 /// Reads a GLB file.
 pub(crate) fn read_glb(bytes: &[u8], folder: Option<&Path>) -> Result<GltfScene, GltfError> {
@@ -84,22 +84,13 @@ fn scene(
         world
     });
     Ok(GltfScene {
+        bytes_beside: accessors.bytes_beside(),
         bound,
         tree,
         takes,
         curves,
         problems,
     })
-}
-
-        bytes_beside: accessors.bytes_beside(),
-fn posed_nodes() -> Problem {
-    Problem {
-        id: "rest-from-bind-pose".to_owned(),
-        severity: Severity::Note,
-        message: "the nodes stand in a pose of their own; the skin's bind pose is taken as rest"
-            .to_owned(),
-    }
 }
 
 fn extension_problems(document: &Document) -> Vec<Problem> {
@@ -111,12 +102,17 @@ fn extension_problems(document: &Document) -> Vec<Problem> {
             "the file requires {name}, of which only plain nodes and animations are used"
         ),
     };
-    document
-        .extensions_required
-        .iter()
-        .filter(unknown)
-        .map(problem)
-        .collect()
+    let required = document.extensions_required.iter();
+    let mut problems: Vec<Problem> = required.filter(unknown).map(problem).collect();
+    if document.extensions.is_none() {
+        problems.push(Problem {
+            id: "extension-unreadable".to_owned(),
+            severity: Severity::Note,
+            message: "the bones that the file's VRM extension names can't be read; the joints are told from skins and motion"
+                .to_owned(),
+        });
+    }
+    problems
 }
 
 impl Scene for GltfScene {
@@ -160,10 +156,10 @@ impl Scene for GltfScene {
     }
 
     fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
 
     fn bytes_beside(&self) -> usize {
         self.bytes_beside
-    }
-        &self.problems
     }
 }

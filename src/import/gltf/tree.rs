@@ -2,7 +2,7 @@
 
 use super::GltfError;
 use super::curve::unit;
-use super::document::Document;
+use super::document::{Document, Extensions};
 use crate::import::rigid::rotation_of;
 use crate::import::scene;
 use gltf::json::{Index, Node};
@@ -102,9 +102,14 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
         .skins
         .iter()
         .flat_map(|skin| skin.joints.iter().map(Index::value));
-    for node in skinned.chain(document.extensions.bones()) {
+    for node in skinned {
         let mark = bone.get_mut(node).ok_or_else(|| missing(node))?;
         *mark = true;
+    }
+    for node in document.extensions.iter().flat_map(Extensions::bones) {
+        if let Some(mark) = bone.get_mut(node) {
+            *mark = true;
+        }
     }
     let about = |&node: &usize| {
         let source = &document.nodes[node];
