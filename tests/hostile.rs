@@ -55,12 +55,15 @@ const CONSTANT: usize = 256 << 10;
 const PER_TRANSFORM: usize = 160;
 /// Transforms that any file may be sampled to.
 const FREE_TRANSFORMS: usize = 1 << 20;
+/// Bytes for lists as long as they may be, of the shortest entries.
+const LIST: usize = 128 << 20;
 const ROUNDS: usize = 2000;
 const SOON: Duration = Duration::from_secs(10);
 
-fn deepmimic() -> Vec<u8> {
+/// A still in which every frame lasts `seconds`.
+fn deepmimic(seconds: &str) -> Vec<u8> {
     let pose = ["1.0", "0.0", "0.0", "0.0"];
-    let numbers: Vec<&str> = ["0.0333", "0.0", "0.9", "0.0"]
+    let numbers: Vec<&str> = [seconds, "0.0", "0.9", "0.0"]
         .into_iter()
         .chain(pose.into_iter().cycle().take(40))
         .collect();
@@ -163,6 +166,10 @@ fn gltf(nodes: &str, skins: &str, takes: &str) -> Vec<u8> {
         {{"componentType":5126,"count":2,"type":"VEC3"}},{{"componentType":5126,"count":1,"type":"MAT4"}}]}}"#
     )
     .into_bytes()
+}
+
+fn many_nodes(count: usize) -> Vec<u8> {
+    gltf(&vec!["{}"; count].join(","), "", "")
 }
 
 /// Many skins of many nodes.
@@ -311,7 +318,7 @@ fn reading_costs_no_more_than_the_size_allows() {
     let files = [
         ("kick.fbx", clip("kick.fbx")),
         ("walk.glb", clip("walk.glb")),
-        ("a.txt", deepmimic()),
+        ("a.txt", deepmimic("0.0333")),
     ];
     for (name, bytes) in files {
         let survived = survived(name, &bytes);
@@ -326,6 +333,31 @@ fn reading_costs_no_more_than_the_size_allows() {
         error.to_string()
     };
     assert!(refusal("zeros.gltf", &many_zeros()).contains("more than"));
+    assert!(frugal("tiny.txt", &deepmimic("1e-300")).is_ok());
+    let (many, peak) = HEAP.peak_of(|| {
+        import::read(
+            &many_nodes(200_000),
+            "nodes.gltf",
+            None,
+            &Options::default(),
+        )
+    });
+    assert!(many.expect_err("refused").to_string().contains("at most"));
+    assert!(peak < LIST, "{peak} bytes");
+    let (few, peak) = HEAP.peak_of(|| {
+        import::read(
+            &many_nodes(131_072),
+            "nodes.gltf",
+            None,
+            &Options::default(),
+        )
+    });
+    assert!(
+        few.expect_err("refused")
+            .to_string()
+            .contains("no animation")
+    );
+    assert!(peak < LIST, "{peak} bytes");
     assert!(refusal("skins.gltf", &many_skins()).contains("no animation"));
     assert!(refusal("meshes.gltf", &long_take_of_many_meshes()).contains("--trim"));
     assert!(frugal("curves.fbx", &shared_curve_node(20_000)).is_ok());

@@ -176,6 +176,12 @@ fn curve(count: usize) -> Vec<u8> {
     })
 }
 
+/// Whether the only take can't be used.
+fn is_refused(bytes: &[u8]) -> bool {
+    let scene = read(bytes).expect("a broken take doesn't block the others");
+    scene.takes()[0].fault.is_some()
+}
+
 #[test]
 fn circles_are_cut() {
     let scene = read(&curve(3)).expect("a circle isn't fatal");
@@ -193,13 +199,13 @@ fn a_small_file_can_not_fill_the_memory() {
     // 12 million keys take 144 MB and compress to about 150 kB.
     let bytes = curve(12_000_000);
     assert!(bytes.len() < 400_000);
-    assert!(matches!(read(&bytes), Err(FbxError::Broken { .. })));
+    assert!(is_refused(&bytes));
 }
 
 #[test]
 fn arrays_must_hold_what_they_claim() {
     let honest = curve(1000);
-    assert!(read(&honest).is_ok());
+    assert!(!is_refused(&honest));
     let at = honest
         .windows(7)
         .position(|window| window == b"KeyTime")
@@ -208,10 +214,7 @@ fn arrays_must_hold_what_they_claim() {
     for claim in [0u32, 999, 1001, 1_000_000, u32::MAX] {
         let mut bytes = honest.clone();
         bytes[at..at + 4].copy_from_slice(&claim.to_le_bytes());
-        assert!(
-            matches!(read(&bytes), Err(FbxError::Broken { .. })),
-            "a claim of {claim} was believed"
-        );
+        assert!(is_refused(&bytes), "a claim of {claim} was believed");
     }
 }
 

@@ -30,6 +30,23 @@ pub(super) struct Curves {
 const MOST_KEYS: usize = 64 << 20;
 /// How often a connection is followed on average, at most. In real files no layer or curve has several users.
 const STEPS_PER_LINK: usize = 16;
+/// A curve that can't be read, by its id.
+struct BadCurve {
+    id: i64,
+    reason: &'static str,
+}
+
+impl BadCurve {
+    fn of(self, take: &str, driven: String) -> FbxError {
+        FbxError::Curve {
+            take: take.into(),
+            driven,
+            id: self.id,
+            reason: self.reason.into(),
+        }
+    }
+}
+
 /// More layers than this would have to be weighed at every frame.
 const MOST_LAYERS: usize = 256;
 
@@ -62,16 +79,13 @@ impl Curves {
         spend(&mut self.keys, keys)
     }
 
-    fn load(&mut self, object: &Object, index: usize) -> Result<Option<usize>, FbxError> {
+    fn load(&mut self, object: &Object, index: usize) -> Result<Option<usize>, BadCurve> {
         if let Some(&known) = self.of_object.get(&index) {
             return Ok(known);
         }
         let curve = Curve::read(object.record, self.ticks, &mut self.budget).map_err(|reason| {
             let id = object.record.int(0).unwrap_or(0);
-            FbxError::Broken {
-                place: format!("animation curve {id}"),
-                reason: reason.into(),
-            }
+            BadCurve { id, reason }
         })?;
         let place = curve.map(|curve| {
             self.list.push(curve);
@@ -138,7 +152,7 @@ impl Channel {
 }
 
 /// One take's layers and channels.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Animation {
     layers: Vec<Layer>,
     /// Channels of the nodes that have any, lower layers first.
@@ -154,10 +168,7 @@ impl Animation {
         tree: &Tree,
         curves: &mut Curves,
     ) -> Result<Self, FbxError> {
-        let mut animation = Self {
-            layers: Vec::new(),
-            channels: BTreeMap::new(),
-        };
+        let mut animation = Self::default();
         let objects: Vec<usize> = graph
             .children(stack, "AnimationLayer")
             .map(|link| link.child)
@@ -212,13 +223,15 @@ impl Animation {
             let weighs = graph
                 .parents(curve_node, "AnimationLayer")
                 .any(|link| link.parent == object && link.property == Some(b"Weight"));
-            let driven = match targets.peek() {
-                Some(&(node, _)) => format!("joint `{}`", tree.nodes[node].name),
-                None if weighs => format!("weight of layer `{}`", graph.objects[object].name),
-                None => continue,
-            };
-            let within = |e: FbxError| e.within(&format!("take `{take}`, {driven}"));
-            let axes = axes(graph, curve_node, curves).map_err(within)?;
+            let first = targets.peek().map(|&(node, _)| node);
+            if first.is_none() && !weighs {
+                continue;
+            }
+            let axes = axes(graph, curve_node, curves).map_err(|curve| {
+                let layer = || format!("weight of layer `{}`", graph.objects[object].name);
+                let joint = |node: usize| format!("joint `{}`", tree.nodes[node].name);
+                curve.of(take, first.map_or_else(layer, joint))
+            })?;
             let read = || constants(&templates.properties(graph.objects[curve_node].record));
             let constants = *curves.constants.entry(curve_node).or_insert_with(read);
             for (node, property) in targets {
@@ -386,7 +399,7 @@ fn axes(
     graph: &Graph,
     curve_node: usize,
     curves: &mut Curves,
-) -> Result<[Option<usize>; 3], FbxError> {
+) -> Result<[Option<usize>; 3], BadCurve> {
     let mut axes = [None; 3];
     for link in graph.children(curve_node, "AnimationCurve") {
         let axis = match link.property {

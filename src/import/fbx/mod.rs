@@ -55,19 +55,14 @@ pub enum FbxError {
     Version { found: u32 },
     #[error("broken FBX at {place}: {reason}; export or download it again")]
     Broken { place: String, reason: String },
-}
-
-impl FbxError {
-    /// The same error with what its place belongs to.
-    fn within(self, outer: &str) -> Self {
-        match self {
-            Self::Broken { place, reason } => Self::Broken {
-                place: format!("{outer}, {place}"),
-                reason,
-            },
-            other => other,
-        }
-    }
+    #[error("take `{take}`, {driven}, animation curve {id}: {reason}; export or download it again")]
+    Curve {
+        take: String,
+        /// The joint or weight that the curve drives.
+        driven: String,
+        id: i64,
+        reason: String,
+    },
 }
 
 /// Whether a number of the file is finite and small enough for arithmetic with it to stay so.
@@ -102,7 +97,12 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     let spans = takes::spans(&document);
     let (mut takes, mut animations) = (Vec::new(), Vec::new());
     for stack in graph.of_class("AnimationStack") {
-        let animation = Animation::read(&graph, stack, &templates, &tree, &mut curves)?;
+        let read = Animation::read(&graph, stack, &templates, &tree, &mut curves);
+        let (animation, fault) = match read {
+            Ok(animation) => (animation, None),
+            Err(fault @ FbxError::Curve { .. }) => (Animation::default(), Some(fault.to_string())),
+            Err(error) => return Err(error),
+        };
         let object = &graph.objects[stack];
         let ticks = settings.ticks;
         let properties = templates.properties(object.record);
@@ -115,7 +115,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
             ticks,
             settings.fps,
         );
-        takes.push(take);
+        takes.push(Take { fault, ..take });
         animations.push(animation);
     }
     let curves = curves.list;

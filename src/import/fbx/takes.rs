@@ -152,6 +152,15 @@ fn spacing_fps(animation: &Animation, curves: &[Curve], ticks: f64) -> Option<f6
 /// What a take's owner should know about it.
 fn problems(take: &Take, animation: &Animation, curves: &[Curve], ticks: f64) -> Vec<Problem> {
     let mut problems = Vec::new();
+    if all_curves(animation, curves).any(|curve| curve.mended) {
+        problems.push(super::warning(
+            "mended-curves",
+            &format!(
+                "take `{}` has curves with keys out of order or without a finite value",
+                take.name
+            ),
+        ));
+    }
     let mut note = |id: &str, message| {
         problems.push(Problem {
             id: id.into(),
@@ -159,13 +168,6 @@ fn problems(take: &Take, animation: &Animation, curves: &[Curve], ticks: f64) ->
             message,
         });
     };
-    if all_curves(animation, curves).any(|curve| curve.mended) {
-        let message = format!(
-            "take `{}` has curves with keys out of order or without a finite value",
-            take.name
-        );
-        note("mended-curves", message);
-    }
     if animation.silent() > 0 {
         let (silent, name) = (animation.silent(), &take.name);
         let message = format!("take `{name}` has {silent} muted layers, which are left out");

@@ -19,7 +19,8 @@ pub(super) struct Placement {
 /// A node's own transform. A matrix may hold shear, which the three parts can't.
 pub(super) struct Rest {
     pub placement: Placement,
-    matrix: Option<Matrix4<f64>>,
+    /// Rare, and large.
+    matrix: Option<Box<Matrix4<f64>>>,
 }
 
 /// The nodes of a file in an order in which parents come first.
@@ -57,13 +58,14 @@ impl Placement {
 
 impl Rest {
     pub fn matrix(&self) -> Matrix4<f64> {
-        self.matrix.unwrap_or_else(|| self.placement.matrix())
+        let own = self.matrix.as_deref().copied();
+        own.unwrap_or_else(|| self.placement.matrix())
     }
 
     fn new(node: &Node) -> Self {
         let matrix = node
             .matrix
-            .map(|m| Matrix4::from_column_slice(&m.map(f64::from)));
+            .map(|m| Box::new(Matrix4::from_column_slice(&m.map(f64::from))));
         let placement = match &matrix {
             Some(matrix) => parts(matrix),
             None => Placement {
