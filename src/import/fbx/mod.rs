@@ -40,6 +40,7 @@ use nodes::{Rig, Tree};
 use objects::Graph;
 use properties::Templates;
 use settings::Settings;
+use takes::Stated;
 use transform::World;
 
 /// Why a file can't be read as FBX.
@@ -104,17 +105,13 @@ pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
             Err(error) => return Err(error),
         };
         let object = &graph.objects[stack];
-        let ticks = settings.ticks;
-        let properties = templates.properties(object.record);
-        let take = takes::take(
-            &object.name,
-            &properties,
-            spans.get(&object.name),
-            &animation,
-            &curves.list,
-            ticks,
-            settings.fps,
-        );
+        let stated = Stated {
+            properties: templates.properties(object.record),
+            listed: spans.get(&object.name),
+            ticks: settings.ticks,
+            fps: settings.fps,
+        };
+        let take = takes::take(&object.name, &stated, &animation, &curves.list);
         takes.push(Take { fault, ..take });
         animations.push(animation);
     }

@@ -37,23 +37,27 @@ pub(super) fn spans(document: &Document) -> BTreeMap<String, Span> {
     takes.filter_map(span).collect()
 }
 
-/// Makes the take `name` of an animation. `listed` is what the file's list of takes says of it. `fps` is what the file states; `ticks` is ticks per second.
-pub(super) fn take(
-    name: &str,
-    properties: &Properties,
-    listed: Option<&Span>,
-    animation: &Animation,
-    curves: &[Curve],
-    ticks: f64,
-    fps: Option<f64>,
-) -> Take {
-    let keyed = key_range(animation, curves);
-    let (start, end) = span(properties, listed, keyed, ticks);
+/// What a file says of a take's time.
+pub(super) struct Stated<'s, 'd, 'a> {
+    pub properties: Properties<'s, 'd, 'a>,
+    /// What the list of takes says.
+    pub listed: Option<&'s Span>,
+    /// Ticks per second.
+    pub ticks: f64,
+    /// Frame rate, where it is stated.
+    pub fps: Option<f64>,
+}
+
+/// Makes the take `name` of an animation.
+pub(super) fn take(name: &str, stated: &Stated, animation: &Animation, curves: &[Curve]) -> Take {
+    let (ticks, keyed) = (stated.ticks, key_range(animation, curves));
+    let (start, end) = span(stated, keyed);
     let moves = |node: &usize| {
         let mut own = curves_of(animation, *node, curves);
         own.any(|curve| curve.varies((start * ticks).round(), (end * ticks).round()))
     };
     let animated = animation.nodes().filter(moves).collect();
+    let fps = stated.fps;
     let fps = fps.unwrap_or_else(|| spacing_fps(animation, curves, ticks).unwrap_or(FALLBACK_FPS));
     let mut take = Take {
         name: name.into(),
@@ -99,12 +103,8 @@ fn key_range(animation: &Animation, curves: &[Curve]) -> Option<(f64, f64)> {
 }
 
 /// Start and end in seconds: the take's own span, else its reference span, else that of its keys.
-fn span(
-    properties: &Properties,
-    listed: Option<&Span>,
-    keyed: Option<(f64, f64)>,
-    ticks: f64,
-) -> (f64, f64) {
+fn span(take: &Stated, keyed: Option<(f64, f64)>) -> (f64, f64) {
+    let (properties, ticks) = (&take.properties, take.ticks);
     let stated = |start, stop, listed: Option<(i64, i64)>| {
         let own = properties.int(stop);
         let own = own.map(|stop| (properties.int(start).unwrap_or(0), stop));
@@ -112,6 +112,7 @@ fn span(
         let (start, stop) = (start as f64 / ticks, stop as f64 / ticks);
         (stop > start).then_some((start, stop))
     };
+    let listed = take.listed;
     let spans = [
         stated("LocalStart", "LocalStop", listed.and_then(|s| s.local)),
         stated(
