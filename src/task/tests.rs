@@ -262,7 +262,7 @@ fn limbs_keep_their_length_between_the_frames_of_a_slow_clip() {
     let stage = stage();
     let mut slow = motion("kick.fbx", None);
     // Every fourth frame: about 8 Hz.
-    let keep = |f: &usize| f % 4 == 0;
+    let keep = |f: &usize| f.is_multiple_of(4);
     let qpos = (0..slow.qpos.len())
         .filter(keep)
         .map(|f| slow.qpos[f].clone());
