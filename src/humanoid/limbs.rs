@@ -11,6 +11,9 @@ const CANDIDATES: usize = 12;
 /// What a joint loses in confidence when it stands outside the chain of its limb.
 const APART: f64 = 0.4;
 
+/// What a name has to score to be believed without the rest of its limb.
+const SURE: f64 = 0.9;
+
 type Candidate = (usize, f64);
 
 /// Joint, confidence, and whether it stands apart from the limb.
@@ -78,7 +81,8 @@ fn candidates(labels: &[Label], part: Part, side: Side) -> Vec<Candidate> {
 
 impl Limb {
     fn find(&self, tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut HumanoidMap) {
-        let Some(chain) = self.chain(tree, labels) else {
+        let Some(chain) = self.chain(tree, joints, labels) else {
+            self.single(tree, joints, labels, found);
             return;
         };
         // A chain that is whole vouches for names that alone could mean something else.
@@ -99,7 +103,11 @@ impl Limb {
         let (root, end) = (chain[0].map(|l| l.0), chain[2].map(|l| l.0));
         if let (Some((part, slot)), Some(root)) = (self.before, root) {
             let above = candidates(labels, part, self.side);
-            if let Some((j, score)) = above.into_iter().find(|c| tree.is_above(c.0, root)) {
+            let mut above = above.into_iter().filter(|c| tree.is_above(c.0, root));
+            if let Some(best) = above.next() {
+                // Of equals the one next to the arm; others stand in the trunk.
+                let nearest = above.filter(|c| c.1 == best.1 && tree.is_above(best.0, c.0));
+                let (j, score) = nearest.last().unwrap_or(best);
                 found.insert(slot, j, score, said(j));
             }
         }
@@ -113,15 +121,33 @@ impl Limb {
         }
     }
 
+    /// Links whose names leave no doubt, where there is no chain; shape has to find the others.
+    fn single(&self, tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut HumanoidMap) {
+        let mut above: Option<usize> = None;
+        for (part, slot) in self.parts.into_iter().zip(self.slots) {
+            let fitting = candidates(labels, part, self.side);
+            let sure = |c: &&Candidate| c.1 >= SURE && above.is_none_or(|a| tree.is_above(a, c.0));
+            if let Some(&(joint, score)) = fitting.iter().find(sure) {
+                let reason = format!("its name, `{}`", joints[joint].name);
+                found.insert(slot, joint, score, reason);
+                above = Some(joint);
+            }
+        }
+    }
+
     /// Best root, bend and end: joint, confidence, whether it stands apart.
-    fn chain(&self, tree: &Tree, labels: &[Label]) -> Option<[Option<Link>; 3]> {
+    fn chain(&self, tree: &Tree, joints: &[Joint], labels: &[Label]) -> Option<[Option<Link>; 3]> {
         let [roots, bends, ends] = self.parts.map(|part| candidates(labels, part, self.side));
         let mut best: Option<(f64, [Option<Link>; 3])> = None;
         for root in &roots {
             for bend in bends.iter().filter(|b| tree.is_above(root.0, b.0)) {
                 let end = end_of(tree, &ends, root.0, bend.0, self.beyond.is_some());
                 let sum = root.1 + bend.1 + end.map_or(0.0, |e| e.1);
-                if best.is_none_or(|(most, _)| sum > most + 1e-9) {
+                let wins = best.is_none_or(|(most, chain)| {
+                    let equal = (sum - most).abs() <= 1e-9;
+                    sum > most + 1e-9 || equal && is_nearer(tree, joints, &chain, root.0, bend.0)
+                });
+                if wins {
                     let link = |c: &Candidate| Some((c.0, c.1, false));
                     best = Some((sum, [link(root), link(bend), end]));
                 }
@@ -129,6 +155,34 @@ impl Limb {
         }
         best.map(|(_, chain)| chain)
     }
+}
+
+/// Whether `root` stands between the root of a chain with the same bend and that bend: the other one is a joint
+/// between limb and trunk (`LHipJoint`, `__UpLeg_L`).
+fn is_nearer(
+    tree: &Tree,
+    joints: &[Joint],
+    chain: &[Option<Link>; 3],
+    root: usize,
+    bend: usize,
+) -> bool {
+    match chain {
+        [Some((old, ..)), Some((old_bend, ..)), _] => {
+            *old_bend == bend
+                && tree.is_above(*old, root)
+                && !are_segments(&joints[*old].name, &joints[root].name)
+        }
+        _ => false,
+    }
+}
+
+/// Whether two names differ in their number: parts of one bone, which begins with the first.
+fn are_segments(a: &str, b: &str) -> bool {
+    let pick =
+        |name: &str, is: fn(char) -> bool| name.chars().filter(|c| is(*c)).collect::<String>();
+    let digits = |c: char| c.is_ascii_digit();
+    pick(a, char::is_alphabetic) == pick(b, char::is_alphabetic)
+        && pick(a, digits) != pick(b, digits)
 }
 
 /// The end of a limb: nearest below its bend, or else (feet only) one that an IK rig keeps outside of the chain.

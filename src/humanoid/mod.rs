@@ -193,7 +193,7 @@ pub fn map(joints: &[Joint]) -> Result<HumanoidMap, NotHumanoid> {
     let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
     let mut found = HumanoidMap::default();
     limbs::find(&tree, joints, &labels, &mut found);
-    shape::complete(&tree, &mut found);
+    shape::complete(&tree, &labels, &mut found);
     trunk::find(&tree, joints, &labels, &mut found);
     let missing: Vec<Slot> = Slot::REQUIRED
         .into_iter()

@@ -90,7 +90,7 @@ const FOREIGN: [&str; 54] = [
 ];
 
 /// Words that say nothing about the part: prefixes of rigs and kinds of node.
-const NOISE: [&str; 24] = [
+const NOISE: [&str; 27] = [
     "mixamorig",
     "def",
     "org",
@@ -115,38 +115,44 @@ const NOISE: [&str; 24] = [
     "m",
     "g",
     "human",
+    "bend",
+    "stretch",
+    "x",
 ];
 
 /// What the core of a sided name means, best first.
 fn sided(core: &str) -> &'static [(Part, f64)] {
     match core {
-        "upleg" | "upperleg" | "legupper" | "thigh" | "upperthigh" | "femur" => {
+        "upleg" | "upperleg" | "legupper" | "legup" | "uleg" | "thigh" | "upperthigh" | "femur" => {
             &[(Part::UpperLeg, 1.0)]
         }
+        "足" => &[(Part::UpperLeg, 0.9)],
         "hip" | "hips" => &[(Part::UpperLeg, 0.8)],
-        "lowerleg" | "leglower" | "lowleg" | "calf" | "shin" | "knee" | "tibia" | "crus" => {
-            &[(Part::LowerLeg, 1.0)]
-        }
+        // A joint between the hips and the leg, where there is a better one.
+        "hipjoint" => &[(Part::UpperLeg, 0.45)],
+        "lowerleg" | "leglower" | "lowleg" | "loleg" | "lleg" | "calf" | "shin" | "knee"
+        | "tibia" | "crus" | "ひざ" => &[(Part::LowerLeg, 1.0)],
         "leg" => &[
             (Part::LowerLeg, 0.9),
             (Part::UpperLeg, 0.5),
             (Part::Foot, 0.2),
         ],
-        "foot" | "ankle" => &[(Part::Foot, 1.0), (Part::Toes, 0.2)],
-        "toe" | "toes" | "ball" | "forefoot" => &[(Part::Toes, 1.0)],
-        "clavicle" | "collar" | "collarbone" => &[(Part::Clavicle, 1.0)],
+        "foot" | "ankle" | "足首" => &[(Part::Foot, 1.0), (Part::Toes, 0.2)],
+        "toe" | "toes" | "ball" | "forefoot" | "つま先" => &[(Part::Toes, 1.0)],
+        "clavicle" | "collar" | "collarbone" | "scapula" | "肩" => &[(Part::Clavicle, 1.0)],
         "shoulder" => &[(Part::Clavicle, 0.9), (Part::UpperArm, 0.6)],
-        "upperarm" | "armupper" | "uparm" | "humerus" => &[(Part::UpperArm, 1.0)],
+        "upperarm" | "armupper" | "armup" | "uparm" | "uarm" | "humerus" | "腕" => {
+            &[(Part::UpperArm, 1.0)]
+        }
         "shldr" => &[(Part::UpperArm, 0.9), (Part::Clavicle, 0.5)],
         "arm" => &[
             (Part::UpperArm, 0.9),
             (Part::LowerArm, 0.4),
             (Part::Hand, 0.2),
         ],
-        "forearm" | "lowerarm" | "armlower" | "lowarm" | "elbow" | "radius" | "ulna" => {
-            &[(Part::LowerArm, 1.0)]
-        }
-        "hand" | "wrist" => &[(Part::Hand, 1.0)],
+        "forearm" | "farm" | "lowerarm" | "armlower" | "lowarm" | "loarm" | "elbow" | "radius"
+        | "ulna" | "ひじ" => &[(Part::LowerArm, 1.0)],
+        "hand" | "wrist" | "手首" => &[(Part::Hand, 1.0)],
         "fist" => &[(Part::Hand, 0.9)],
         _ => &[],
     }
@@ -155,11 +161,11 @@ fn sided(core: &str) -> &'static [(Part, f64)] {
 /// What the core of a name without side means.
 fn central(core: &str) -> Option<Part> {
     match core {
-        "hips" | "hip" | "pelvis" => Some(Part::Hips),
+        "hips" | "hip" | "pelvis" | "下半身" => Some(Part::Hips),
         "spine" | "chest" | "upperchest" | "torso" | "abdomen" | "thorax" | "waist" | "back"
-        | "lowerback" | "upperback" | "body" | "ribcage" => Some(Part::Trunk),
-        "neck" => Some(Part::Neck),
-        "head" | "skull" => Some(Part::Head),
+        | "lowerback" | "upperback" | "body" | "ribcage" | "上半身" => Some(Part::Trunk),
+        "neck" | "首" => Some(Part::Neck),
+        "head" | "skull" | "頭" => Some(Part::Head),
         _ => None,
     }
 }
@@ -179,7 +185,7 @@ impl Label {
             if FOREIGN.contains(&rest) {
                 return Label::foreign();
             }
-            if !NOISE.contains(&rest) {
+            if !NOISE.contains(&rest) || (rest == "joint" && core == "hip") {
                 core.push_str(rest);
             }
         }
@@ -207,8 +213,25 @@ impl Label {
     }
 }
 
+/// Parts that rigs write in capitals behind the letter of a side: `LUArm`, `RFArm`.
+const CAPITALS: [&str; 4] = ["uarm", "farm", "uleg", "lleg"];
+
 /// Lower-case words of a name: split at what is no letter, and where lower case turns into upper case.
 fn words(name: &str) -> Vec<String> {
+    let runs = name.split(|c: char| !c.is_alphabetic());
+    runs.flat_map(|run| {
+        let low = run.to_lowercase();
+        let part = low.strip_prefix(['l', 'r']);
+        if part.is_some_and(|part| CAPITALS.contains(&part)) {
+            vec![low]
+        } else {
+            humps(run)
+        }
+    })
+    .collect()
+}
+
+fn humps(name: &str) -> Vec<String> {
     let letters: Vec<char> = name.chars().collect();
     let mut words = vec![String::new()];
     for (i, c) in letters.iter().enumerate() {
@@ -218,12 +241,10 @@ fn words(name: &str) -> Vec<String> {
             && (before.is_some_and(char::is_lowercase)
                 || (before.is_some_and(char::is_uppercase)
                     && after.is_some_and(|a| a.is_lowercase())));
-        if starts || !c.is_alphabetic() {
+        if starts {
             words.push(String::new());
         }
-        if c.is_alphabetic()
-            && let Some(last) = words.last_mut()
-        {
+        if let Some(last) = words.last_mut() {
             last.extend(c.to_lowercase());
         }
     }
@@ -234,11 +255,19 @@ fn words(name: &str) -> Vec<String> {
 /// Side that a word names, and what is left of the word.
 fn split_side(word: &str) -> (Option<Side>, &str) {
     match word {
-        "l" | "left" | "lft" => return (Some(Side::Left), ""),
-        "r" | "right" | "rgt" => return (Some(Side::Right), ""),
+        "l" | "left" | "lft" | "lf" | "lt" => return (Some(Side::Left), ""),
+        "r" | "right" | "rgt" | "rt" => return (Some(Side::Right), ""),
         _ => {}
     }
-    for (spelling, side) in [("left", Side::Left), ("right", Side::Right)] {
+    for (spelling, side) in [
+        ("left", Side::Left),
+        ("right", Side::Right),
+        ("gauche", Side::Left),
+        ("droite", Side::Right),
+        ("droit", Side::Right),
+        ("左", Side::Left),
+        ("右", Side::Right),
+    ] {
         if let Some(rest) = word
             .strip_prefix(spelling)
             .or_else(|| word.strip_suffix(spelling))
@@ -298,7 +327,32 @@ mod tests {
         ] {
             assert_eq!(label(name), (Some(Side::Left), "thigh".into()), "{name}");
         }
-        assert_eq!(label("LHipJoint"), (Some(Side::Left), "hip".into()));
+        for (name, core) in [
+            ("LHipJoint", "hipjoint"),
+            ("lf_thigh", "thigh"),
+            ("lt_foot", "foot"),
+            ("lThighBend", "thigh"),
+            ("thigh_stretch.l", "thigh"),
+            ("LUArm", "uarm"),
+            ("LFArm", "farm"),
+            ("lf_arm", "arm"),
+            ("LoLeg_L", "loleg"),
+            ("Scapula_L", "scapula"),
+            ("hand_gauche", "hand"),
+            ("左ひじ", "ひじ"),
+            ("左足首", "足首"),
+        ] {
+            assert_eq!(label(name), (Some(Side::Left), core.into()), "{name}");
+        }
+        for (name, core) in [
+            ("rt_shin", "shin"),
+            ("RFArm", "farm"),
+            ("foot_droite", "foot"),
+            ("右腕", "腕"),
+        ] {
+            assert_eq!(label(name), (Some(Side::Right), core.into()), "{name}");
+        }
+        assert_eq!(label("spine_02.x"), (None, "spine".into()));
         assert_eq!(label("RIGHT_KNEE"), (Some(Side::Right), "knee".into()));
     }
 

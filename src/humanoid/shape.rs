@@ -1,5 +1,6 @@
 //! Arms and legs by the shape of the rest pose, where names don't tell.
 
+use super::names::{Label, Side};
 use super::tree::Tree;
 use super::{HumanoidMap, NotHumanoid, Slot};
 use nalgebra::Vector3;
@@ -8,6 +9,8 @@ use nalgebra::Vector3;
 const BY_SHAPE: f64 = 0.5;
 /// Two branches are a pair when their lengths and end heights differ by no more than this part of their length.
 const PAIR_TOLERANCE: f64 = 0.15;
+/// A joint further from a bend than this part of the bone below it starts a bone of its own.
+const LIKE_BONE: f64 = 0.5;
 /// Branches of one joint that are compared.
 const BRANCHES: usize = 16;
 
@@ -43,73 +46,99 @@ struct Branch {
     length: f64,
 }
 
-/// Fills limbs that their names left incomplete.
-pub(super) fn complete(tree: &Tree, found: &mut HumanoidMap) {
+/// Fills limbs that their names left incomplete. What is named stays, as far as the rest of its limb fits to it.
+pub(super) fn complete(tree: &Tree, labels: &[Label], found: &mut HumanoidMap) {
+    let reach = reaches(tree);
+    let limbs: [&[Slot]; 4] = [
+        &LEFT_LEG[..3],
+        &RIGHT_LEG[..3],
+        &LEFT_ARM[1..],
+        &RIGHT_ARM[1..],
+    ];
+    for limb in limbs {
+        fill_gaps(tree, &reach, found, [limb[0], limb[1], limb[2]]);
+    }
     let lacks =
         |found: &HumanoidMap, slots: &[Slot]| slots.iter().any(|s| found.joint(*s).is_none());
-    for [lower, foot] in [
-        [Slot::LeftLowerLeg, Slot::LeftFoot],
-        [Slot::RightLowerLeg, Slot::RightFoot],
-        [Slot::LeftLowerArm, Slot::LeftHand],
-        [Slot::RightLowerArm, Slot::RightHand],
-    ] {
-        add_end(tree, found, lower, foot);
-    }
-    let legs_missing = lacks(found, &LEFT_LEG[..3]) || lacks(found, &RIGHT_LEG[..3]);
-    let arms_missing = lacks(found, &LEFT_ARM[1..3]) || lacks(found, &RIGHT_ARM[1..3]);
-    if !legs_missing && !arms_missing {
-        return;
-    }
-    let reach = reaches(tree);
-    if legs_missing && let Some([left, right]) = legs(tree, &reach) {
-        replace(
-            found,
-            &LEFT_LEG,
-            &left,
-            "its place in a leg of the rest pose",
-        );
-        replace(
-            found,
-            &RIGHT_LEG,
-            &right,
-            "its place in a leg of the rest pose",
-        );
-    }
-    if arms_missing && let Some([left, right]) = arms(tree, &reach, found) {
-        replace(
-            found,
-            &LEFT_ARM,
-            &left,
-            "its place in an arm of the rest pose",
-        );
-        replace(
-            found,
-            &RIGHT_ARM,
-            &right,
-            "its place in an arm of the rest pose",
-        );
-    }
-}
-
-/// Takes the only joint below a lower leg or arm for its foot or hand.
-fn add_end(tree: &Tree, found: &mut HumanoidMap, bend: Slot, end: Slot) {
-    if let (Some(above), None) = (found.joint(bend), found.joint(end))
-        && let [only] = tree.children[above][..]
+    if (lacks(found, &LEFT_LEG[..3]) || lacks(found, &RIGHT_LEG[..3]))
+        && let Some([left, right]) = legs(tree, labels, &reach)
     {
-        found.insert(
-            end,
-            only,
-            BY_SHAPE,
-            format!("the only joint below the {bend}"),
-        );
+        let reason = "its place in a leg of the rest pose";
+        supplement(tree, found, &LEFT_LEG, &left, reason);
+        supplement(tree, found, &RIGHT_LEG, &right, reason);
+    }
+    if (lacks(found, &LEFT_ARM[1..3]) || lacks(found, &RIGHT_ARM[1..3]))
+        && let Some([left, right]) = arms(tree, labels, &reach, found)
+    {
+        let reason = "its place in an arm of the rest pose";
+        supplement(tree, found, &LEFT_ARM, &left, reason);
+        supplement(tree, found, &RIGHT_ARM, &right, reason);
     }
 }
 
-fn replace(found: &mut HumanoidMap, slots: &[Slot; 4], joints: &[Option<usize>; 4], reason: &str) {
-    for (slot, joint) in slots.iter().zip(joints) {
-        found.matches.remove(slot);
+/// The links of a limb that follow from those which are known: root above bend above end.
+fn fill_gaps(
+    tree: &Tree,
+    reach: &[(Option<usize>, f64)],
+    found: &mut HumanoidMap,
+    slots: [Slot; 3],
+) {
+    let length = |a: usize, b: usize| tree.span(a, b).norm();
+    let [root, bend, end] = slots.map(|slot| found.joint(slot));
+    let (slot, joint, reason) = match (root, bend, end) {
+        (Some(root), None, Some(end)) => {
+            let uneven = |j: &usize| (length(root, *j) - length(*j, end)).abs();
+            let between = tree.path(root, end).into_iter().skip(1);
+            let middle = between
+                .filter(|j| *j != end)
+                .min_by(|a, b| uneven(a).total_cmp(&uneven(b)));
+            (slots[1], middle, "the middle of its limb")
+        }
+        (None, Some(bend), Some(end)) => {
+            let far = |j: &usize| length(*j, bend) > LIKE_BONE * length(bend, end);
+            let above = tree.upward(bend).skip(1).find(far);
+            (slots[0], above, "the joint above its limb's bend")
+        }
+        (_, Some(bend), None) => {
+            let only = match tree.children[bend][..] {
+                [only] => Some(only),
+                _ => reach[bend].0.filter(|_| root.is_some()),
+            };
+            (slots[2], only, "the joint below its limb's bend")
+        }
+        _ => return,
+    };
+    if let Some(joint) = joint.filter(|j| !found.matches.values().any(|m| m.joint == *j)) {
+        found.insert(slot, joint, BY_SHAPE, reason.to_owned());
+    }
+}
+
+/// Puts a limb that was found by its shape into the slots that are empty. Where the named joints aren't part of it,
+/// it takes their slots too.
+fn supplement(
+    tree: &Tree,
+    found: &mut HumanoidMap,
+    slots: &[Slot; 4],
+    joints: &[Option<usize>; 4],
+    reason: &str,
+) {
+    let chain = slots.iter().zip(joints);
+    let merged: Vec<(Slot, Option<usize>, bool)> = chain
+        .map(|(slot, joint)| match found.joint(*slot) {
+            Some(named) => (*slot, Some(named), true),
+            None => (*slot, *joint, false),
+        })
+        .collect();
+    let links: Vec<usize> = merged.iter().filter_map(|link| link.1).collect();
+    let fits = links.windows(2).all(|pair| tree.is_above(pair[0], pair[1]));
+    for (i, (slot, joint, named)) in merged.into_iter().enumerate() {
+        let joint = if fits { joint } else { joints[i] };
+        if named && fits {
+            continue;
+        }
+        found.matches.remove(&slot);
         if let Some(joint) = joint {
-            found.insert(*slot, *joint, BY_SHAPE, reason.to_owned());
+            found.insert(slot, joint, BY_SHAPE, reason.to_owned());
         }
     }
 }
@@ -174,7 +203,11 @@ fn mirrored(tree: &Tree, pair: &[Branch; 2]) -> bool {
 }
 
 /// Mirrored branches that end lowest: upper leg, lower leg, foot, toes of the left, then of the right.
-fn legs(tree: &Tree, reach: &[(Option<usize>, f64)]) -> Option<[[Option<usize>; 4]; 2]> {
+fn legs(
+    tree: &Tree,
+    labels: &[Label],
+    reach: &[(Option<usize>, f64)],
+) -> Option<[[Option<usize>; 4]; 2]> {
     let mut best: Option<(f64, [[usize; 3]; 2], [Branch; 2])> = None;
     for pair in pairs(tree, reach, 3) {
         let low = end(tree, &pair[0]).z + end(tree, &pair[1]).z;
@@ -195,7 +228,10 @@ fn legs(tree: &Tree, reach: &[(Option<usize>, f64)]) -> Option<[[Option<usize>; 
         [Some(leg[0]), Some(leg[1]), Some(leg[2]), toes]
     };
     let (first, second) = (chain(a, &pair[0]), chain(b, &pair[1]));
-    Some(if tree.span(b[0], a[0]).dot(&side) > 0.0 {
+    // Hips may coincide; knees and ankles stand apart.
+    let across: Vector3<f64> = (0..3).map(|i| tree.span(b[i], a[i])).sum();
+    let leads = named_first(labels, &pair).unwrap_or(across.dot(&side) > 0.0);
+    Some(if leads {
         [first, second]
     } else {
         [second, first]
@@ -228,6 +264,21 @@ fn leg_joints(tree: &Tree, branch: &Branch) -> Option<[usize; 3]> {
     best.map(|(_, chain)| chain)
 }
 
+/// Whether names say that the first branch is the left one; they know better than the shape.
+fn named_first(labels: &[Label], pair: &[Branch; 2]) -> Option<bool> {
+    let side = |branch: &Branch| {
+        // A bare letter is no side.
+        let named = branch
+            .joints
+            .iter()
+            .filter(|j| !labels[**j].core.is_empty());
+        let names = named.filter_map(|j| labels[*j].side);
+        names.fold(0, |sum, side| sum + if side == Side::Left { 1 } else { -1 })
+    };
+    let [first, second] = [side(&pair[0]), side(&pair[1])];
+    (first != second).then_some(first > second)
+}
+
 /// Unit vector to the figure's left, from where its feet point; a figure whose feet don't tell faces +X.
 fn facing(tree: &Tree, feet: [(usize, &Branch); 2]) -> Vector3<f64> {
     let toes = |(ankle, branch): (usize, &Branch)| end(tree, branch) - tree.at[ankle].coords;
@@ -242,6 +293,7 @@ fn facing(tree: &Tree, feet: [(usize, &Branch); 2]) -> Vector3<f64> {
 /// The longest mirrored pair outside of the legs: clavicle, upper arm, lower arm, hand of both sides.
 fn arms(
     tree: &Tree,
+    labels: &[Label],
     reach: &[(Option<usize>, f64)],
     found: &HumanoidMap,
 ) -> Option<[[Option<usize>; 4]; 2]> {
@@ -249,7 +301,13 @@ fn arms(
         found.joint(Slot::LeftUpperLeg)?,
         found.joint(Slot::RightUpperLeg)?,
     ];
-    let side = tree.span(right, left);
+    let apart = |slots: [Slot; 2]| match slots.map(|slot| found.joint(slot)) {
+        [Some(left), Some(right)] => tree.span(right, left),
+        _ => Vector3::zeros(),
+    };
+    let side = apart([Slot::LeftUpperLeg, Slot::RightUpperLeg])
+        + apart([Slot::LeftLowerLeg, Slot::RightLowerLeg])
+        + apart([Slot::LeftFoot, Slot::RightFoot]);
     let in_leg = |j: usize| {
         [left, right]
             .iter()
@@ -264,7 +322,8 @@ fn arms(
         .filter(|pair| pair.iter().all(|b| !in_leg(b.joints[0])) && across(pair))
         .max_by(|a, b| a[0].length.total_cmp(&b[0].length))?;
     let [a, b] = [arm_joints(tree, &best[0]), arm_joints(tree, &best[1])];
-    let leads = (end(tree, &best[0]) - end(tree, &best[1])).dot(&side) > 0.0;
+    let across = (end(tree, &best[0]) - end(tree, &best[1])).dot(&side);
+    let leads = named_first(labels, &best).unwrap_or(across > 0.0);
     Some(if leads { [a, b] } else { [b, a] })
 }
 

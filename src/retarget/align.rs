@@ -23,6 +23,20 @@ pub(super) struct Alignment {
     pub scale: f64,
 }
 
+/// Right and left joints whose distance tells where left is, best first.
+const LEG_PAIRS: [[Slot; 2]; 3] = [
+    [Slot::RightUpperLeg, Slot::LeftUpperLeg],
+    [Slot::RightLowerLeg, Slot::LeftLowerLeg],
+    [Slot::RightFoot, Slot::LeftFoot],
+];
+const ARM_PAIRS: [[Slot; 2]; 3] = [
+    [Slot::RightUpperArm, Slot::LeftUpperArm],
+    [Slot::RightLowerArm, Slot::LeftLowerArm],
+    [Slot::RightHand, Slot::LeftHand],
+];
+/// Joints nearer to each other coincide, leg lengths.
+const APART: f64 = 0.01;
+
 /// Where the slots are in a rest pose.
 struct Figure {
     at: BTreeMap<Slot, Vector3<f64>>,
@@ -84,13 +98,20 @@ impl Figure {
         (mean.is_finite() && mean > 1e-6).then_some(mean)
     }
 
+    /// From the right to the left joint of the first pair that doesn't coincide; rigs put hips on one point.
+    fn across(&self, pairs: &[[Slot; 2]]) -> Option<Vector3<f64>> {
+        let least = APART * self.leg_length()?;
+        let mut spans = pairs
+            .iter()
+            .filter_map(|[right, left]| self.span(*right, *left));
+        spans.find(|span| span.norm() > least)
+    }
+
     /// Horizontal unit vector to the figure's left, from hips and shoulders.
     fn left(&self) -> Option<Vector3<f64>> {
-        let hips = self.span(Slot::RightUpperLeg, Slot::LeftUpperLeg)?;
-        let arms = self
-            .span(Slot::RightUpperArm, Slot::LeftUpperArm)
-            .unwrap_or(hips);
-        let across = hips + arms;
+        let arms = self.across(&ARM_PAIRS);
+        let hips = self.across(&LEG_PAIRS).or(arms)?;
+        let across = hips + arms.unwrap_or(hips);
         Vector3::new(across.x, across.y, 0.0).try_normalize(1e-9)
     }
 
@@ -99,13 +120,9 @@ impl Figure {
     fn frame(&self, slot: Slot) -> Option<UnitQuaternion<f64>> {
         let (up, left) = (Vector3::z(), self.left()?);
         let forward = left.cross(&up);
-        let bone = |from: Slot, to: Slot| self.span(from, to)?.try_normalize(1e-9);
         let (along, second) = match slot {
-            Slot::Hips | Slot::Spine => (bone(Slot::RightUpperLeg, Slot::LeftUpperLeg)?, up),
-            Slot::Chest | Slot::Neck | Slot::Head => (
-                bone(Slot::RightUpperArm, Slot::LeftUpperArm).unwrap_or(left),
-                up,
-            ),
+            Slot::Hips | Slot::Spine => (self.across(&LEG_PAIRS).unwrap_or(left), up),
+            Slot::Chest | Slot::Neck | Slot::Head => (self.across(&ARM_PAIRS).unwrap_or(left), up),
             Slot::LeftFoot | Slot::LeftToes => {
                 (self.toward(Slot::LeftFoot, Slot::LeftToes, forward), up)
             }

@@ -1,3 +1,4 @@
+mod odd;
 mod rigs;
 
 use super::*;
