@@ -1,10 +1,11 @@
 //! Metrics over the frames of episodes; formulas as in DeepMimic, PHC and the papers they name.
 
 use super::episode::{Frame, Trace, positions};
+use crate::motion::skate;
 use crate::sim::{Link, LinkState};
-use crate::skeleton::Shape;
+use crate::skeleton::Twist;
 use crate::task::Stage;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// What an evaluation found. Means are over all frames of all episodes, the one that shows a failure included.
@@ -31,7 +32,7 @@ pub struct Evaluation {
     pub angular_momentum_error: f64,
     /// 2PR/(P + R) of contact link × frame against the reference's contacts.
     pub contact_f1: f64,
-    /// Mean horizontal speed of the lowest point of a contact link while it presses on the ground, m/s.
+    /// Mean horizontal speed of a contact link on the ground while it presses on it, m/s; see [`skate::sole_speed`].
     pub foot_skate_m_s: f64,
     /// Mean over episodes of summed reward ÷ the steps of an episode without failure.
     pub normalized_return: f64,
@@ -154,37 +155,12 @@ fn foot_skate(stage: &Stage, traces: &[Trace]) -> f64 {
     }))
 }
 
-/// Horizontal speed of the link's lowest point, m/s.
 fn sole_speed(link: &Link, state: &LinkState) -> f64 {
-    let lowest = link
-        .shapes
-        .iter()
-        .map(|shape| lowest_point(shape, state))
-        .min_by(|a, b| a.z.total_cmp(&b.z))
-        .unwrap_or(state.pose.translation.vector);
-    let velocity = state.linear
-        + state
-            .angular
-            .cross(&(lowest - state.pose.translation.vector));
-    f64::from(velocity.xy().norm())
-}
-
-fn lowest_point(shape: &Shape, state: &LinkState) -> Vector3<f32> {
-    let place = |p: &Vector3<f64>| (state.pose * Point3::from(p.cast::<f32>())).coords;
-    let below = |p: Vector3<f32>, radius: f64| p - Vector3::z() * radius as f32;
-    match shape {
-        Shape::Sphere { center, radius } => below(place(center), *radius),
-        Shape::Capsule { a, b, radius } => {
-            let (a, b) = (place(a), place(b));
-            below(if a.z < b.z { a } else { b }, *radius)
-        }
-        Shape::Box { pose, half } => {
-            let down =
-                (state.pose.rotation.cast::<f64>() * pose.rotation).inverse() * -Vector3::z();
-            let corner = Vector3::from_fn(|i, _| half[i] * down[i].signum());
-            place(&(pose * Point3::from(corner)).coords)
-        }
-    }
+    let twist = Twist {
+        linear: state.linear.cast(),
+        angular: state.angular.cast(),
+    };
+    skate::sole_speed(&link.shapes, &state.pose.cast(), &twist)
 }
 
 /// Angle that a root turned about the axis of the reference's own net turning, each in its own frame.

@@ -8,6 +8,7 @@ mod momentum;
 mod nnls;
 mod phase;
 mod sample;
+pub mod skate;
 mod summary;
 mod timeline;
 mod velocity;

@@ -140,6 +140,24 @@ fn standing_is_explained_by_the_feet() {
     }
 }
 
+/// Whoever lies still on the back is carried by the ground, though neither feet nor hands stand.
+#[test]
+fn lying_is_explained_by_what_lies_on_the_ground() {
+    let s = humanoid();
+    let mut lying = s.rest_qpos();
+    let back = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2);
+    lying[3..7].copy_from_slice(&[back.w, back.i, back.j, back.k]);
+    lying[2] -= s.lowest_point(&s.forward(&lying));
+    let none = Draft {
+        contact: Some(vec![vec![false; 2]; 12]),
+        ..draft(&s, vec![lying; 12], 30.0)
+    };
+    let weight = s.total_mass() * 9.81;
+    for w in &Motion::from_poses(&s, none).tracks.root_wrench_residual {
+        assert!(w.fixed_rows::<3>(0).norm() < 0.05 * weight, "{w}");
+    }
+}
+
 #[test]
 fn free_fall_needs_nothing() {
     let s = humanoid();
