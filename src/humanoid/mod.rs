@@ -179,6 +179,18 @@ fn list(slots: &[Slot]) -> String {
     names.join(", ")
 }
 
+/// The slots whose joints can be found in any joint tree, few or none in one that is no humanoid: where to begin a map
+/// by hand.
+pub fn partial(joints: &[Joint]) -> HumanoidMap {
+    let tree = tree::Tree::new(joints);
+    let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
+    let mut found = HumanoidMap::default();
+    limbs::find(&tree, joints, &labels, &mut found);
+    shape::complete(&tree, &labels, &mut found);
+    trunk::find(&tree, joints, &labels, &mut found);
+    found
+}
+
 /// Finds the joint of every humanoid slot in a joint tree, from names first, then from the shape of the rest pose.
 ///
 /// # Errors
@@ -189,12 +201,7 @@ pub fn map(joints: &[Joint]) -> Result<HumanoidMap, NotHumanoid> {
             joints: joints.len(),
         });
     }
-    let tree = tree::Tree::new(joints);
-    let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
-    let mut found = HumanoidMap::default();
-    limbs::find(&tree, joints, &labels, &mut found);
-    shape::complete(&tree, &labels, &mut found);
-    trunk::find(&tree, joints, &labels, &mut found);
+    let found = partial(joints);
     let missing: Vec<Slot> = Slot::REQUIRED
         .into_iter()
         .filter(|slot| found.joint(*slot).is_none())
@@ -202,7 +209,7 @@ pub fn map(joints: &[Joint]) -> Result<HumanoidMap, NotHumanoid> {
     if !missing.is_empty() {
         return Err(NotHumanoid::Missing { missing });
     }
-    shape::refuse_quadruped(&tree, &found)?;
+    shape::refuse_quadruped(&tree::Tree::new(joints), &found)?;
     Ok(found)
 }
 

@@ -59,7 +59,7 @@ impl Args {
             Ok(map) => map,
             Err(e) => {
                 report.problems.push(not_humanoid(&e));
-                HumanoidMap::default()
+                humanoid::partial(&joints)
             }
         };
         report.map = rows(&map, &joints);
