@@ -1,6 +1,6 @@
 //! Which way is up in a file, and how its axes become Z up, X forward, Y left.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 use std::str::FromStr;
 
@@ -29,6 +29,18 @@ impl UpAxis {
         (UpAxis::PlusZ, "+Z"),
         (UpAxis::MinusZ, "-Z"),
     ];
+
+    /// The axis that `direction`, in the file's coordinates, is nearest to.
+    pub(crate) fn nearest(direction: &Vector3<f64>) -> Self {
+        let ends = [
+            (Self::PlusX, Self::MinusX),
+            (Self::PlusY, Self::MinusY),
+            (Self::PlusZ, Self::MinusZ),
+        ];
+        let axis = direction.iamax();
+        let (plus, minus) = ends[axis];
+        if direction[axis] < 0.0 { minus } else { plus }
+    }
 
     /// Rotation from the file's axes to Z up, X forward, Y left, for a file of which only the up axis is known.
     ///
@@ -69,7 +81,6 @@ impl FromStr for UpAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     #[test]
     fn every_axis_becomes_up_by_a_rotation() {
@@ -84,6 +95,7 @@ mod tests {
         for ((axis, name), up) in UpAxis::NAMES.iter().zip(up) {
             let turn = axis.canonical_from_file();
             assert_eq!(turn * up, Vector3::z(), "{name}");
+            assert_eq!(UpAxis::nearest(&(up * 3.0)), *axis);
             assert_eq!(turn.determinant(), 1.0, "{name}");
             assert_eq!(name.parse(), Ok(*axis));
         }

@@ -3,12 +3,16 @@
 use super::facing;
 use super::rigid::{Frame, locals};
 use super::scene::Scene;
-use super::{Error, tree};
+use super::upright::{self, Stature};
+use super::{Error, UpAxis, tree};
 use crate::clip::{Grid, Joint, Problem, Severity};
 use nalgebra::{Isometry3, UnitQuaternion};
 
 /// A rest pose this much smaller than the first frame's, as a part of it, has collapsed.
 const COLLAPSED: f64 = 0.01;
+
+/// Times within a take at which it is looked at which way the figure stands.
+const LOOKS: usize = 9;
 
 /// The joints of a scene, and how its world matrices become theirs.
 pub(crate) struct Rig<'a> {
@@ -19,6 +23,8 @@ pub(crate) struct Rig<'a> {
     nodes: Vec<usize>,
     parents: Vec<Option<usize>>,
     pub joints: Vec<Joint>,
+    /// Up axis that the figure has, where the file states another.
+    pub other_up: Option<UpAxis>,
     pub problems: Vec<Problem>,
 }
 
@@ -48,10 +54,14 @@ impl<'a> Rig<'a> {
             nodes,
             parents,
             joints,
+            other_up: None,
             problems,
         };
         let rest = rig.usable_rest(first)?;
         rig.joints = rig.rest_joints(rest)?;
+        if !frame.is_sure {
+            rig.stand_up(rest, first.map(|(take, _)| take))?;
+        }
         rig.face_forward(rest)?;
         Ok(rig)
     }
@@ -124,6 +134,27 @@ impl<'a> Rig<'a> {
             rest,
         };
         Ok(locals.into_iter().enumerate().map(joint).collect())
+    }
+
+    /// Takes the figure's own up axis where the file's is wrong.
+    fn stand_up(&mut self, rest: Option<(usize, f64)>, take: Option<usize>) -> Result<(), Error> {
+        let (Some(take), Some(stature)) = (take, Stature::of(&self.joints)) else {
+            return Ok(());
+        };
+        let about = &self.scene.takes()[take];
+        let at = |k: usize| about.start + (about.end - about.start) * k as f64 / (LOOKS - 1) as f64;
+        let motion: Vec<_> = (0..LOOKS)
+            .filter_map(|k| self.world(Some((take, at(k))), None).ok())
+            .collect();
+        let up = stature.other_up(&self.world(rest, None)?, &motion, &self.frame.axes);
+        if let Some(up) = up {
+            self.frame.axes = up.canonical_from_file();
+            self.joints = self.rest_joints(rest)?;
+            self.problems
+                .push(upright::problem(self.scene.up_axis(), up));
+            self.other_up = Some(up);
+        }
+        Ok(())
     }
 
     fn face_forward(&mut self, rest: Option<(usize, f64)>) -> Result<(), Error> {

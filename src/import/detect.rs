@@ -9,6 +9,7 @@ pub(crate) enum Format {
     Glb,
     Gltf,
     DeepMimic,
+    Bvh,
 }
 
 /// How far into a text the words that tell its kind are looked for, in bytes.
@@ -31,6 +32,9 @@ pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
         .trim_ascii_start();
     if text.starts_with(b"{") {
         return detect_json(text);
+    }
+    if text.len() >= 9 && text[..9].eq_ignore_ascii_case(b"HIERARCHY") {
+        return Ok(Format::Bvh);
     }
     Err(refusal(text))
 }
@@ -88,20 +92,18 @@ fn refusal(text: &[u8]) -> String {
     let says = |word: &[u8]| head.windows(word.len()).any(|w| w == word);
     let kind = if text.is_empty() {
         "an empty file; write it again"
-    } else if head.starts_with(b"HIERARCHY") {
-        "a BVH file; convert it to FBX or glTF, in Blender for example"
     } else if head.starts_with(b"; FBX") || says(b"FBXHeaderExtension") {
         "an ASCII FBX file; save it as binary FBX"
     } else if head.starts_with(b"#") && says(b":root") || says(b":bonedata") {
-        "an ASF/AMC file; convert it to FBX or glTF"
+        "an ASF/AMC file; convert it to FBX, glTF or BVH"
     } else if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\x1f\x8b") {
         "a packed archive; unpack it first"
     } else if head.starts_with(b"BLENDER") {
         "a Blender file; export it as FBX or glTF"
     } else if says(b"<COLLADA") {
-        "a COLLADA file; convert it to FBX or glTF"
+        "a COLLADA file; convert it to FBX, glTF or BVH"
     } else {
-        "no format that is known; give binary FBX, glTF, GLB or DeepMimic JSON"
+        "no format that is known; give binary FBX, glTF, GLB, BVH or DeepMimic JSON"
     };
     kind.to_owned()
 }
@@ -119,6 +121,7 @@ mod tests {
             detect(b"{\"Loop\":\"wrap\",\"Frames\":[]}"),
             Ok(Format::DeepMimic)
         );
+        assert_eq!(detect(b"hierarchy\r\nROOT Hips"), Ok(Format::Bvh));
     }
 
     #[test]
@@ -149,7 +152,6 @@ mod tests {
     fn what_cannot_be_read_is_named() {
         let refused = |bytes: &[u8]| detect(bytes).expect_err("refused");
         assert!(refused(b"; FBX 7.4.0 project file").contains("ASCII FBX"));
-        assert!(refused(b"HIERARCHY\nROOT Hips").contains("BVH"));
         assert!(refused(b"").contains("empty"));
         assert!(refused(b"{\"Skeleton\":{}}").contains("character"));
         assert!(refused(b"{\"a\":1}").contains("glTF"));

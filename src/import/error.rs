@@ -1,5 +1,6 @@
 //! What can go wrong between a file and a clip.
 
+use super::bvh::BvhError;
 use super::deepmimic::DeepMimicError;
 use super::fbx::FbxError;
 use super::gltf::GltfError;
@@ -21,6 +22,8 @@ pub enum Error {
     Fbx { file: String, source: FbxError },
     #[error("{file}: {source}")]
     Gltf { file: String, source: GltfError },
+    #[error("{file}: {source}")]
+    Bvh { file: String, source: BvhError },
     #[error("{file}: {source}")]
     DeepMimic {
         file: String,

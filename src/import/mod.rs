@@ -5,6 +5,7 @@
 
 mod axes;
 mod bind;
+mod bvh;
 mod canonical;
 mod deepmimic;
 mod detect;
@@ -12,13 +13,16 @@ mod error;
 mod facing;
 mod fbx;
 mod gltf;
+mod measure;
 mod rigid;
 mod scene;
 mod seam;
 mod take;
 mod tree;
+mod upright;
 
 pub use axes::{UnknownAxis, UpAxis};
+pub use bvh::BvhError;
 pub use deepmimic::DeepMimicError;
 pub use error::Error;
 pub use fbx::FbxError;
@@ -73,7 +77,7 @@ pub struct TakeInfo {
 /// What is in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
-    /// `fbx`, `gltf` or `deepmimic`.
+    /// `fbx`, `gltf`, `bvh` or `deepmimic`.
     pub format: String,
     pub takes: Vec<TakeInfo>,
     /// Place in `takes` of the one that is loaded when none is named.
@@ -138,6 +142,13 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
     Ok(match format {
         Format::Glb => Box::new(gltf::read_glb(bytes, folder).map_err(gltf)?),
         Format::Gltf => Box::new(gltf::read_json(bytes, folder).map_err(gltf)?),
+        Format::Bvh => {
+            let read = bvh::read(bytes, stem(file));
+            Box::new(read.map_err(|source| Error::Bvh {
+                file: owned(),
+                source,
+            })?)
+        }
         Format::DeepMimic => {
             let read = deepmimic::read(bytes, stem(file));
             Box::new(read.map_err(|source| Error::DeepMimic {
@@ -172,7 +183,9 @@ fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
         takes: scene.takes().iter().map(take_info).collect(),
         default_take,
         joints: rig.joints,
-        up_axis: scene.up_axis().to_owned(),
+        up_axis: rig
+            .other_up
+            .map_or_else(|| scene.up_axis().to_owned(), |up| up.to_string()),
         unit_m: scene.unit_m(),
         problems,
     })
@@ -210,7 +223,12 @@ fn frame(scene: &dyn Scene, file: &str, options: &Options) -> Result<Frame, Erro
         Some(up) if up.to_string() != scene.up_axis() => up.canonical_from_file(),
         _ => scene.canonical_from_file(),
     };
-    Ok(Frame { axes, unit_m })
+    let is_sure = options.up.is_some();
+    Ok(Frame {
+        axes,
+        unit_m,
+        is_sure,
+    })
 }
 
 /// Samples a take, to `most` frames × joints at most.
@@ -264,6 +282,7 @@ fn clip(
             fps: about.fps,
             up_axis: options
                 .up
+                .or(rig.other_up)
                 .map_or_else(|| scene.up_axis().to_owned(), |up| up.to_string()),
             unit_m: options.unit_m.unwrap_or_else(|| scene.unit_m()),
         },

@@ -9,6 +9,8 @@ pub(crate) struct Frame {
     pub axes: Matrix3<f64>,
     /// Metres per unit of the file.
     pub unit_m: f64,
+    /// Somebody said which way is up, and the figure has no say in it.
+    pub is_sure: bool,
 }
 
 /// Places beyond this are damage, not motion, and single precision can't hold them: metres.

@@ -38,7 +38,7 @@ pub(crate) struct Take {
 
 /// An animation file after parsing. Nothing in it can be out of range any more.
 pub(crate) trait Scene {
-    /// `fbx`, `gltf` or `deepmimic`.
+    /// `fbx`, `gltf`, `bvh` or `deepmimic`.
     fn format(&self) -> &'static str;
     fn nodes(&self) -> &[Node];
     fn takes(&self) -> &[Take];

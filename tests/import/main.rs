@@ -1,6 +1,7 @@
 //! Importers against evaluations of the formats' own formulas that share no code with them.
 
 mod beside;
+mod bvh;
 mod damage;
 mod deepmimic;
 mod gltf;

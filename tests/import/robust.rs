@@ -45,6 +45,7 @@ fn damaged_real_files() {
     let files = [
         ("deepmimic/humanoid3d_backflip.txt", 800),
         ("deepmimic/humanoid3d_run.txt", 400),
+        ("poser-bvh/run.bvh", 400),
         ("torture-gltf/SimpleSkin.gltf", 2000),
         ("torture-gltf/singleBlendshapeCube_sparse.glb", 2000),
         ("vrm/test.vrma", 2000),

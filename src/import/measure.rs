@@ -1,0 +1,123 @@
+//! What formats without units or exact rates leave to be found out.
+
+use crate::clip::{Problem, Severity};
+use nalgebra::Vector3;
+
+/// Frames per second of a frame time as it is written, `None` where it is no time that frames can have.
+///
+/// A decimal fraction stands for the whole rate of which it is the rounded or cut frame time, if it says at least 4 % of
+/// itself: 0.0333 and 0.033 are 30 Hz, 0.03336667 is 29.97, and 0.03 may be anything and is taken as it is.
+pub(crate) fn rate_of_frame_time(text: &str, seconds: f64) -> Option<f64> {
+    let rate = 1.0 / seconds;
+    if !(1.0..=10_000.0).contains(&rate) {
+        return None;
+    }
+    let digits = text.split(['e', 'E']).next()?;
+    let digits = digits.split(['.', ',']).nth(1).map_or(0, str::len);
+    let unit = 10f64.powi(-(digits.min(300) as i32));
+    let beyond = (1.0 / rate.round() - seconds) / unit;
+    let means_whole = unit <= 0.04 * seconds && (-0.500001..=1.000001).contains(&beyond);
+    Some(if means_whole { rate.round() } else { rate })
+}
+
+/// Metres per unit of a file that doesn't say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scale {
+    pub unit_m: f64,
+    name: &'static str,
+    /// Longest side of the box around the rest pose, in units.
+    size: f64,
+}
+
+impl Scale {
+    /// Units that files are written in. MakeHuman's is the decimetre; the last is that of the CMU motion capture
+    /// database, inches divided by 0.45.
+    const UNITS: [(f64, &'static str); 6] = [
+        (1.0, "metres"),
+        (0.1, "decimetres"),
+        (0.01, "centimetres"),
+        (0.0254, "inches"),
+        (0.001, "millimetres"),
+        (0.0254 / 0.45, "CMU units of 5.64 cm"),
+    ];
+    /// Height of a person's rest pose from toes to the top joint, metres: files end at the head joint or its end site.
+    const PERSON_M: f64 = 1.65;
+
+    /// The unit in which the rest pose is nearest to a person's size.
+    pub fn guess(rest: &[Vector3<f64>]) -> Self {
+        let side = |axis: usize| {
+            let along = rest.iter().map(|place| place[axis]);
+            let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+            (high - low).max(0.0)
+        };
+        let size = (0..3).map(side).fold(0.0, f64::max);
+        let off = |unit: f64| (size * unit / Self::PERSON_M).ln().abs();
+        let nearest = Self::UNITS
+            .iter()
+            .min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
+        let (unit_m, name) = *nearest.filter(|_| size > 0.0).unwrap_or(&Self::UNITS[0]);
+        Self { unit_m, name, size }
+    }
+
+    pub fn problem(&self) -> Option<Problem> {
+        Some(Problem {
+            id: "unit-guessed".to_owned(),
+            severity: Severity::Note,
+            message: format!(
+                "the format has no unit: {} make the figure {:.2} m, the nearest to a person's size; give another with --unit",
+                self.name,
+                self.size * self.unit_m
+            ),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn written_frame_times_mean_whole_rates() {
+        let rate = |text: &str| rate_of_frame_time(text, text.parse().unwrap_or(0.0));
+        for (text, expected) in [
+            ("0.0333333", 30.0),
+            (".03333", 30.0),
+            ("0.033", 30.0),
+            (".0083333", 120.0),
+            ("0.008333", 120.0),
+            ("0.041666", 24.0),
+            ("0.016667", 60.0),
+            ("0.01", 100.0),
+            ("1.666667e-2", 60.0),
+            ("0.03", 1.0 / 0.03),
+            ("0.035", 1.0 / 0.035),
+        ] {
+            let found = rate(text).expect(text);
+            assert!(
+                (found - expected).abs() < 1e-9 * expected,
+                "{text}: {found}"
+            );
+        }
+        assert!((rate("0.0333667").expect("a rate") - 29.97).abs() < 1e-4);
+        for none in ["0", "-0.01", "1e-9", "100"] {
+            assert_eq!(rate(none), None, "{none}");
+        }
+    }
+
+    #[test]
+    fn figures_are_as_tall_as_people() {
+        let of = |height: f64| Scale::guess(&[Vector3::zeros(), Vector3::new(0.1, height, 0.0)]);
+        for (height, unit) in [
+            (1.7, 1.0),
+            (165.0, 0.01),
+            (66.0, 0.0254),
+            (1700.0, 0.001),
+            (16.0, 0.1),
+            (29.0, 0.0254 / 0.45),
+        ] {
+            assert_eq!(of(height).unit_m, unit, "{height}");
+        }
+        assert_eq!(Scale::guess(&[]).unit_m, 1.0);
+        assert!(of(0.1).unit_m > 0.0);
+    }
+}

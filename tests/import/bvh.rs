@@ -1,0 +1,258 @@
+//! BVH files against a direct evaluation of the format, in plain matrices, and files made to be awkward.
+
+use super::data;
+use mimic::clip::Clip;
+use mimic::import::{self, Options};
+use std::path::Path;
+
+type Place = [f64; 3];
+type Matrix = [[f64; 3]; 3];
+
+fn times(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|r| std::array::from_fn(|c| (0..3).map(|k| a[r][k] * b[k][c]).sum()))
+}
+
+/// Rotation about axis 0, 1 or 2.
+fn about(axis: usize, degrees: f64) -> Matrix {
+    let (s, c) = (degrees * std::f64::consts::PI / 180.0).sin_cos();
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut m = [[0.0; 3]; 3];
+    m[axis][axis] = 1.0;
+    (m[u][u], m[u][v], m[v][u], m[v][v]) = (c, -s, s, c);
+    m
+}
+
+struct Joint {
+    parent: Option<usize>,
+    offset: Place,
+    channels: Vec<String>,
+}
+
+/// World places of all joints and end sites, frame after frame, in the file's axes and units.
+fn evaluate(text: &str) -> Vec<Vec<Place>> {
+    let (tree, motion) = text.split_once("MOTION").expect("a motion");
+    let words: Vec<&str> = tree.split_whitespace().collect();
+    let (mut joints, mut open): (Vec<Joint>, Vec<usize>) = (Vec::new(), Vec::new());
+    for (at, word) in words.iter().enumerate() {
+        let number = |k: usize| -> f64 { words[at + k].parse().expect("a number") };
+        match *word {
+            "{" => {
+                let (parent, channels) = (open.last().copied(), Vec::new());
+                open.push(joints.len());
+                joints.push(Joint {
+                    parent,
+                    offset: [0.0; 3],
+                    channels,
+                });
+            }
+            "}" => drop(open.pop()),
+            "OFFSET" => {
+                joints.last_mut().expect("a joint").offset = [number(1), number(2), number(3)]
+            }
+            "CHANNELS" => {
+                let names = &words[at + 2..at + 2 + number(1) as usize];
+                joints.last_mut().expect("a joint").channels =
+                    names.iter().map(|n| n.to_string()).collect();
+            }
+            _ => {}
+        }
+    }
+    let rows = motion
+        .lines()
+        .filter(|line| !line.contains(':') && !line.trim().is_empty());
+    rows.map(|row| {
+        let mut numbers = row
+            .split_whitespace()
+            .map(|w| w.parse::<f64>().expect("a number"));
+        let mut turns: Vec<Matrix> = Vec::new();
+        let mut places: Vec<Place> = Vec::new();
+        for joint in &joints {
+            let mut turn = about(0, 0.0);
+            let mut offset = joint.offset;
+            for channel in &joint.channels {
+                let axis = "XYZ".find(&channel[..1]).expect("an axis");
+                let number = numbers.next().expect("a number for each channel");
+                if channel.ends_with("position") {
+                    offset[axis] = number;
+                } else {
+                    turn = times(&turn, &about(axis, number));
+                }
+            }
+            let (above, origin) = match joint.parent {
+                Some(p) => (turns[p], places[p]),
+                None => (about(0, 0.0), [0.0; 3]),
+            };
+            places.push(std::array::from_fn(|r| {
+                origin[r] + (0..3).map(|k| above[r][k] * offset[k]).sum::<f64>()
+            }));
+            turns.push(times(&above, &turn));
+        }
+        places
+    })
+    .collect()
+}
+
+/// Forward, left and up of a place in a file's axes, before the figure is turned to face forward.
+fn upright(place: &Place, up: char) -> Place {
+    let [x, y, z] = *place;
+    match up {
+        'y' => [z, x, y],
+        _ => [-y, x, z],
+    }
+}
+
+/// The clip has the file's places, but for one turn about the vertical and the unit.
+fn agrees(clip: &Clip, expected: &[Vec<Place>], up: char, unit: f64, what: &str) {
+    assert_eq!(clip.frames.len(), expected.len(), "{what}");
+    let pairs: Vec<(Place, Place)> = (0..expected.len())
+        .flat_map(|f| {
+            let world = clip.world(f);
+            assert_eq!(world.len(), expected[f].len(), "{what}");
+            let found = world
+                .iter()
+                .map(|j| j.translation.vector.into())
+                .collect::<Vec<Place>>();
+            let wanted = expected[f].iter().map(|p| upright(p, up).map(|x| x * unit));
+            found.into_iter().zip(wanted.collect::<Vec<_>>())
+        })
+        .collect();
+    // The turn that brings the horizontal parts together best.
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (a, b) in &pairs {
+        dot += a[0] * b[0] + a[1] * b[1];
+        cross += a[1] * b[0] - a[0] * b[1];
+    }
+    let (s, c) = cross.atan2(dot).sin_cos();
+    for (i, (a, b)) in pairs.iter().enumerate() {
+        let turned = [c * b[0] - s * b[1], s * b[0] + c * b[1], b[2]];
+        let off = (0..3)
+            .map(|k| (a[k] - turned[k]).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        assert!(off < 1e-5, "{what}: place {i} is {a:?}, not {turned:?}");
+    }
+}
+
+#[test]
+fn every_joint_of_every_frame_is_in_its_place() {
+    let cmu = 0.0254 / 0.45;
+    for (name, up, unit) in [
+        ("cmu/cmu_12_01_walk.bvh", 'y', cmu),
+        ("cmu/jumping_jacks.bvh", 'y', cmu),
+        ("poser-bvh/walk.bvh", 'y', 0.01),
+        ("poser-bvh/boxing.bvh", 'y', 0.01),
+        ("games105/walk_and_turn_left.bvh", 'y', 1.0),
+        ("games105/run_forward.bvh", 'y', 1.0),
+        ("makehuman/mh_walk1.bvh", 'z', 0.1),
+    ] {
+        let Some(path) = data(name) else { return };
+        let text = std::fs::read_to_string(&path).expect("the file opens");
+        let clip = import::load(&path, &Options::default()).expect("it imports");
+        agrees(&clip, &evaluate(&text), up, unit, name);
+    }
+}
+
+#[test]
+fn rates_are_those_that_the_frame_times_stand_for() {
+    for (name, fps) in [
+        ("cmu/cmu_12_01_walk.bvh", 120.0),
+        ("cmu/jumping_jacks.bvh", 30.0),
+        ("games105/run_forward.bvh", 60.0),
+        ("makehuman/mh_walk1.bvh", 24.0),
+        ("poser-bvh/walk.bvh", 100.0 / 3.0),
+    ] {
+        let Some(path) = data(name) else { return };
+        let clip = import::load(&path, &Options::default()).expect("it imports");
+        assert!((clip.fps - fps).abs() < 1e-9, "{name}: {}", clip.fps);
+    }
+}
+
+/// Two joints, as few programs would write them: no end site, places on a joint, an exponent, a decimal comma, an
+/// order of its own, two words for a name, and a header that counts three frames.
+const AWKWARD: &str = "hierarchy\r\nRoot Hip Joint {\r\n offset 0 1e0 0\r\n channels 6 Yposition Xposition Zposition \
+    Zrotation Xrotation Yrotation\r\n joint Tip\r\n {\r\n OFFSET 0 .5 0\r\n CHANNELS 4 xrotation Xposition Yposition \
+    ZPOSITION\r\n }\r\n}\r\nMotion\r\nFrames: 3\r\nFrame Time: 0,04\r\n1 2 3 90 0 0 0 0 0,5 0\r\n\
+    1 2 3 0 90 0 45 0 2.5E-1 0\r\n";
+
+fn read(text: &str) -> Result<Clip, String> {
+    let options = Options {
+        unit_m: Some(1.0),
+        ..Options::default()
+    };
+    import::read(text.as_bytes(), "a.bvh", None, &options).map_err(|e| e.to_string())
+}
+
+#[test]
+fn awkward_files_are_read() {
+    let clip = read(AWKWARD).expect("it imports");
+    let names: Vec<&str> = clip.joints.iter().map(|j| j.name.as_str()).collect();
+    assert_eq!(
+        (names, clip.frames.len(), clip.fps),
+        (vec!["Hip Joint", "Tip"], 2, 25.0)
+    );
+    assert!(clip.problems.iter().any(|p| p.id == "frame-count"));
+    let place = |f: usize, j: usize| -> Place { clip.world(f)[j].translation.vector.into() };
+    let near = |a: Place, b: Place| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+    // x, y, z of the file are left, up and forward.
+    assert!(near(place(0, 0), [3.0, 2.0, 1.0]));
+    // A quarter turn about z carries up to the right.
+    assert!(near(place(0, 1), [3.0, 1.5, 1.0]), "{:?}", place(0, 1));
+    // A quarter turn about x carries up to forward.
+    assert!(near(place(1, 1), [3.25, 2.0, 1.0]), "{:?}", place(1, 1));
+}
+
+#[test]
+fn broken_files_are_refused_by_line() {
+    for (from, to, line, says) in [
+        ("offset 0 1e0 0", "offset 0 up 0", 3, "`up`"),
+        ("xrotation Xposition", "wrotation Xposition", 8, "wrotation"),
+        ("channels 6", "channels 7", 4, "7"),
+        ("Frame Time:", "Frame Rate:", 13, "Rate"),
+        ("0,5 0", "0,5 nan", 14, "nan"),
+        (" joint Tip\r\n", " joint Tip\r\n}\r\n", 6, "`}`"),
+    ] {
+        let text = AWKWARD.replacen(from, to, 1);
+        assert_ne!(text, AWKWARD, "{from}");
+        let said = read(&text).expect_err(to);
+        assert!(said.starts_with(&format!("a.bvh: line {line}: ")), "{said}");
+        assert!(said.contains(says), "{said}");
+    }
+}
+
+#[test]
+fn cut_files_are_refused_or_read_in_part() {
+    for end in 0..AWKWARD.len() {
+        if let Ok(clip) = read(&AWKWARD[..end]) {
+            assert!(clip.frames.len() <= 2);
+        }
+    }
+    let whole = AWKWARD.rfind("1 2 3").expect("a last row");
+    let cut = read(&AWKWARD[..whole + 9]).expect("the frames before the cut");
+    assert_eq!(cut.frames.len(), 1);
+    assert!(cut.problems.iter().any(|p| p.id == "frame-cut"));
+}
+
+#[test]
+fn figures_that_stand_along_another_axis_are_set_upright() {
+    for (name, axis) in [
+        ("makehuman/mh_walk1.bvh", "+Z"),
+        ("cmu/cmu_12_01_walk.bvh", "+Y"),
+        ("cmu/07_01_cmu.fbx", "+Y"),
+        ("cmu/49_08_cmu.fbx", "+Y"),
+        ("cmu/91_48.fbx", "+Y"),
+        ("deepmimic/humanoid3d_getup_faceup.txt", "+Y"),
+        ("mixamo/MarathonManBackflip.fbx", "+Y"),
+    ] {
+        let Some(path) = data(name) else { return };
+        let clip = import::load(&path, &Options::default()).expect("it imports");
+        assert_eq!(clip.source.up_axis, axis, "{name}");
+        let corrected = clip.problems.iter().any(|p| p.id == "up-axis-corrected");
+        assert_eq!(corrected, axis == "+Z", "{name}");
+        let word = Options {
+            up: Some("y".parse().expect("an axis")),
+            ..Options::default()
+        };
+        let taken = import::load(Path::new(&path), &word).expect("it imports");
+        assert_eq!(taken.source.up_axis, "+Y", "{name}: --up counts");
+    }
+}
