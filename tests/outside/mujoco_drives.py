@@ -2,9 +2,10 @@
 
 usage: python mujoco_drives.py [SKELETON.xml]
 
-Random targets within ctrlrange are set all at once, without gravity; after four seconds every hinge angle and every
-component of every ball joint's exponential map has to be at its target. A rotation vector longer than pi is the same
-rotation as a shorter one, so targets stay below 2.5 rad. Prints the largest error, exits 1 above 1e-3 rad.
+Random targets within ctrlrange, and within the range of a hinge that can be aimed beyond it, are set all at once,
+without gravity; after four seconds every hinge angle and every component of every ball joint's exponential map has to
+be at its target. A rotation vector longer than pi is the same rotation as a shorter one, so targets stay below 2.5 rad.
+Prints the largest error, exits 1 above 1e-3 rad.
 """
 
 import sys
@@ -14,7 +15,11 @@ import numpy as np
 
 
 def targets(model, random):
-    low, high = model.actuator_ctrlrange.T
+    low, high = model.actuator_ctrlrange.T.copy()
+    joints = model.actuator_trnid[:, 0]
+    limited = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited[joints] == 1)
+    low[limited] = np.maximum(low, model.jnt_range[joints, 0])[limited]
+    high[limited] = np.minimum(high, model.jnt_range[joints, 1])[limited]
     target = low + (high - low) * random.uniform(0.1, 0.9, model.nu)
     for joint in range(model.njnt):
         servos = model.actuator_trnid[:, 0] == joint
