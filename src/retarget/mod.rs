@@ -16,6 +16,7 @@ mod rotation;
 mod seam;
 mod solve;
 mod stance;
+mod system;
 mod travel;
 
 pub use report::{MappedJoint, Report, Spread};
@@ -129,6 +130,7 @@ pub fn retarget(
         goals: &goals,
         anchors: &anchors,
         fps: clip.fps,
+        limit: cost::weight::LIMIT,
     };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
     let contact_bodies = stance::contact_bodies(&model, &goals, &anchors);
@@ -180,8 +182,17 @@ fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
         frames.pop();
     }
     let iterations = Solver::new(problem, cycle).run(&mut frames);
+    // Clamping moves feet, so it should have nothing left to do.
+    let skeleton = problem.model.skeleton;
+    let is_outside = |qpos: &[f64]| limits::violations(skeleton, qpos) > 0;
+    for limit in cost::weight::STIFF_LIMITS {
+        if frames.iter().any(|qpos| is_outside(qpos)) {
+            let stiff = Problem { limit, ..*problem };
+            Solver::new(&stiff, cycle).mend(&mut frames, is_outside);
+        }
+    }
     for qpos in &mut frames {
-        limits::clamp(problem.model.skeleton, qpos);
+        limits::clamp(skeleton, qpos);
     }
     if let (Some(cycle), Some(first)) = (cycle, frames.first()) {
         let turn = rotation::exp(&(Vector3::z() * cycle.heading)).to_rotation_matrix();

@@ -1,8 +1,10 @@
 mod recorded;
+mod windows;
 
 use super::goals::{Key, Turn};
 use super::model::put_quaternion;
 use super::stance::Anchor;
+use super::system::Window;
 use super::*;
 use crate::clip::{Joint, Source};
 use crate::humanoid::Slot;
@@ -288,21 +290,33 @@ fn the_gradient_is_the_derivative_of_the_cost() {
             goals: &goals,
             anchors: &anchors,
             fps: 30.0,
+            limit: cost::weight::LIMIT,
         };
-        for cycle in [None, Some(&turning)] {
+        for (cycle, start, count) in [
+            (None, 0, 6),
+            (Some(&turning), 0, 6),
+            (None, 2, 3),
+            (Some(&turning), 4, 4),
+        ] {
             let solver = Solver::new(&problem, cycle);
-            let (_, gradient) = solver.cost_and_gradient(&frames);
-            for f in [0, 1, 3, 5] {
+            let window = Window {
+                start,
+                count,
+                total: 6,
+                repeats: cycle.is_some(),
+            };
+            let (_, gradient) = solver.cost_and_gradient(&frames, window);
+            for (place, f) in window.frames().enumerate() {
                 for dof in 0..skeleton.nv {
                     let cost = |step: f64| {
                         let mut moved = frames.clone();
                         let mut tangent = vec![0.0; skeleton.nv];
                         tangent[dof] = step;
                         model.step(&mut moved[f], &tangent);
-                        solver.cost_and_gradient(&moved).0
+                        solver.cost_and_gradient(&moved, window).0
                     };
                     let slope = (cost(1e-6) - cost(-1e-6)) / 2e-6;
-                    let found = gradient[f * skeleton.nv + dof];
+                    let found = gradient[place * skeleton.nv + dof];
                     let error = (slope - found).abs() / (1.0 + slope.abs());
                     assert!(
                         error < 1e-4,
