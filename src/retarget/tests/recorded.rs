@@ -88,3 +88,30 @@ fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
     let done = retarget(&clip, &skeleton, &Options::default()).unwrap();
     assert_good(&done.report, 0.01);
 }
+
+/// Google's MuJoCo humanoid hangs on its torso; its hips go where the source's are all the same.
+#[test]
+fn a_skeleton_rooted_at_its_torso_has_its_hips_where_the_source_has_them() {
+    let Some(path) = data("characters/mujoco_humanoid.xml") else {
+        return;
+    };
+    let skeleton = Skeleton::load(&path).unwrap();
+    let Some(clip) = clip("deepmimic/humanoid3d_spinkick.txt", None) else {
+        return;
+    };
+    let map = humanoid::map(&clip.joints).unwrap();
+    let alignment = align::align(&clip, &map, &skeleton).unwrap();
+    let model = Model::new(&skeleton);
+    let goals = Goals::new(&clip, &map, &alignment, &model);
+    for (f, qpos) in goals.guess.iter().enumerate() {
+        let bodies = skeleton.forward(qpos);
+        let source = clip.world(f);
+        let mut apart = Vector3::zeros();
+        for slot in [Slot::LeftUpperLeg, Slot::RightUpperLeg] {
+            let joint = map.joint(slot).unwrap();
+            apart += bodies[skeleton.slots[&slot]].translation.vector;
+            apart -= source[joint].translation.vector * alignment.scale;
+        }
+        assert!(apart.norm() < 1e-9, "frame {f}: {}", apart.norm());
+    }
+}
