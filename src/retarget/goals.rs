@@ -119,13 +119,6 @@ impl Goals {
         self.points.len()
     }
 
-    /// Moves everything.
-    pub fn shift(&mut self, by: &Vector3<f64>) {
-        for f in 0..self.frames() {
-            self.shift_frame(f, by);
-        }
-    }
-
     /// Moves everything at frame `f`.
     pub fn shift_frame(&mut self, f: usize, by: &Vector3<f64>) {
         self.points[f].iter_mut().for_each(|p| *p += by);
