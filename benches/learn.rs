@@ -36,11 +36,15 @@ fn training(
         .act(learner.parameters(), observations, &noise, &mut workspace)?;
     let (advantages, returns) = (normal(SAMPLES, rng), normal(SAMPLES, rng));
     let (actions, log_probs) = (acted.actions.to_vec(), acted.log_probs.to_vec());
+    let values = learner
+        .policy()
+        .values(learner.parameters(), observations, &mut workspace)?
+        .to_vec();
     let batch = Batch {
         observations,
         actions: &actions,
         log_probs: &log_probs,
-        values: acted.values,
+        values: &values,
         advantages: &advantages,
         returns: &returns,
     };

@@ -84,6 +84,12 @@ impl<T: Scalar> Experience<T> {
         let noise = random::<T>(SAMPLES * policy.spec().action, rng);
         let mut workspace = ActWorkspace::default();
         let acted = policy.act(learner.parameters(), &observations, &noise, &mut workspace)?;
+        let mut judging = ActWorkspace::default();
+        let values = policy.values(
+            learner.parameters(),
+            &observations,
+            &mut judging,
+        )?;
         // As if an older policy had acted: ratios fall on both sides of the clipping range.
         let shift = random::<T>(SAMPLES, rng);
         let log_probs = acted.log_probs.iter().zip(shift);
@@ -95,7 +101,7 @@ impl<T: Scalar> Experience<T> {
             actions: acted.actions.to_vec(),
             log_probs_acted: acted.log_probs.to_vec(),
             log_probs,
-            values: acted.values.to_vec(),
+            values: values.to_vec(),
             advantages,
             returns: returns.collect(),
             observations,

@@ -58,12 +58,13 @@ pub struct Acted<'w, T> {
     pub actions: &'w [T],
     /// `[batch]`: natural logarithm of the actions' probability density.
     pub log_probs: &'w [T],
-    /// `[batch]`: the critic's estimate of the discounted return.
-    pub values: &'w [T],
 }
 
 const MAX_WIDTH: usize = 1 << 16;
 const MAX_LAYERS: usize = 16;
+
+/// Rows in one pass of the critic. A product of larger matrices is cut into blocks by its size, which gives other bits.
+const JUDGED_AT_ONCE: usize = 64;
 
 impl Policy {
     pub fn new(spec: PolicySpec) -> Result<Self, LearnError> {
@@ -163,13 +164,11 @@ impl Policy {
         let batch = self.batch_of(parameters, observations)?;
         check_length("action noise", noise.len(), batch * self.spec.action)?;
         self.run_actor(parameters, observations, batch, workspace);
-        self.run_critic(parameters, observations, batch, workspace);
         let ActWorkspace {
             std,
             means,
             actions,
             log_probs,
-            values,
             ..
         } = workspace;
         let log_std = &parameters[self.log_std_range()];
@@ -191,7 +190,6 @@ impl Policy {
             means,
             actions,
             log_probs,
-            values,
         })
     }
 
@@ -207,15 +205,18 @@ impl Policy {
         Ok(&workspace.means)
     }
 
-    /// The critic's values `[batch]`.
+    /// The critic's estimates of the discounted return, `[batch]`.
     pub fn values<'w, T: Scalar>(
         &self,
         parameters: &[T],
         observations: &[T],
         workspace: &'w mut ActWorkspace<T>,
     ) -> Result<&'w [T], LearnError> {
-        let batch = self.batch_of(parameters, observations)?;
-        self.run_critic(parameters, observations, batch, workspace);
+        self.batch_of(parameters, observations)?;
+        workspace.values.clear();
+        for part in observations.chunks(JUDGED_AT_ONCE * self.spec.observation) {
+            self.run_critic(parameters, part, workspace);
+        }
         Ok(&workspace.values)
     }
 
@@ -251,20 +252,18 @@ impl Policy {
         &self,
         parameters: &[T],
         x: &[T],
-        batch: usize,
         workspace: &mut ActWorkspace<T>,
     ) {
         let values = self.critic.forward(
             &parameters[self.critic_range()],
             x,
-            batch,
+            x.len() / self.spec.observation,
             &mut workspace.network,
         );
         let (mean, std) = (
             parameters[self.value_mean_index()],
             parameters[self.value_std_index()],
         );
-        workspace.values.clear();
         workspace
             .values
             .extend(values.iter().map(|&v| mean + std * v));

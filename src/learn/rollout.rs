@@ -145,6 +145,12 @@ impl Group {
             self.act(actor)?;
             self.step(actor)?;
         }
+        let judged = actor.policy.values(
+            actor.parameters,
+            &self.buffer.observations,
+            &mut self.workspace,
+        )?;
+        self.buffer.values.extend_from_slice(judged);
         actor.normalizer.apply(&self.current, &mut self.normal)?;
         let values = actor
             .policy
@@ -178,7 +184,6 @@ impl Group {
         buffer.observations.extend_from_slice(&self.normal);
         buffer.actions.extend_from_slice(acted.actions);
         buffer.log_probs.extend_from_slice(acted.log_probs);
-        buffer.values.extend_from_slice(acted.values);
         Ok(())
     }
 

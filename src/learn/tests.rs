@@ -32,6 +32,14 @@ struct Experience<T> {
     returns: Vec<T>,
 }
 
+fn judged<T: Scalar>(learner: &Learner<T>, observations: &[T]) -> Vec<T> {
+    let mut workspace = ActWorkspace::default();
+    let values = learner
+        .policy()
+        .values(learner.parameters(), observations, &mut workspace);
+    values.unwrap().to_vec()
+}
+
 impl<T: Scalar> Experience<T> {
     fn new(learner: &Learner<T>, samples: usize, rng: &mut ChaCha8Rng) -> Self {
         let observations = normal(samples * OBSERVATION, rng);
@@ -46,7 +54,7 @@ impl<T: Scalar> Experience<T> {
         Self {
             actions: acted.actions.to_vec(),
             log_probs: log_probs.map(|(&l, s)| l + T::from_f64(0.3) * s).collect(),
-            values: acted.values.to_vec(),
+            values: judged(learner, &observations),
             advantages: normal(samples, rng),
             returns: normal(samples, rng),
             observations,
@@ -344,7 +352,7 @@ fn a_simple_task_is_learned() {
         experience.returns = rewards.map(|(o, a)| reward(o, a)).collect();
         experience.actions = acted.actions.to_vec();
         experience.log_probs = acted.log_probs.to_vec();
-        experience.values = acted.values.to_vec();
+        experience.values = judged(&learner, &experience.observations);
         let pairs = experience.returns.iter().zip(&experience.values);
         experience.advantages = pairs.map(|(r, v)| r - v).collect();
         learner.update(&experience.batch(), &mut rng).unwrap();
@@ -358,7 +366,7 @@ fn a_simple_task_is_learned() {
 
 /// Rollouts may be cut into groups of environments in any way.
 #[test]
-fn the_size_of_the_batch_acted_on_changes_no_bit() {
+fn the_size_of_the_batch_acted_on_or_judged_changes_no_bit() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for (observation, action) in [(220, 28), (5, 3), (258, 21)] {
         let spec = PolicySpec {
@@ -373,18 +381,31 @@ fn the_size_of_the_batch_acted_on_changes_no_bit() {
         let noise: Vec<f32> = normal(64 * action, &mut rng);
         let mut workspace = ActWorkspace::default();
         let mut run = |rows: usize| {
-            let (mut actions, mut values) = (Vec::new(), Vec::new());
+            let mut actions = Vec::new();
             let batches = observations.chunks(rows * observation);
             for (x, n) in batches.zip(noise.chunks(rows * action)) {
                 let acted = policy.act(&parameters, x, n, &mut workspace).unwrap();
                 actions.extend_from_slice(acted.actions);
-                values.extend_from_slice(acted.values);
             }
-            (actions, values)
+            actions
         };
         let whole = run(64);
         for rows in [1, 2, 3, 5, 8, 13, 32, 33] {
             assert!(run(rows) == whole, "{observation} {rows}");
+        }
+        let observations: Vec<f32> = normal(500 * observation, &mut rng);
+        let mut judge = |rows: usize| -> Vec<f32> {
+            let batches = observations.chunks(rows * observation);
+            let mut values = Vec::new();
+            for x in batches {
+                let part = policy.values(&parameters, x, &mut workspace).unwrap();
+                values.extend_from_slice(part);
+            }
+            values
+        };
+        let whole = judge(500);
+        for rows in [1, 7, 64, 65, 128, 333] {
+            assert!(judge(rows) == whole, "{observation} {rows}");
         }
     }
 }
