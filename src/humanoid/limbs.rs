@@ -106,8 +106,8 @@ impl Limb {
             let mut above = above.into_iter().filter(|c| tree.is_above(c.0, root));
             if let Some(best) = above.next() {
                 // Of equals the one next to the arm; others stand in the trunk.
-                let mut equals = above.filter(|c| c.1 == best.1 && tree.is_above(best.0, c.0));
-                let (j, score) = equals.next_back().unwrap_or(best);
+                let mut nearest = above.filter(|c| c.1 == best.1 && tree.is_above(best.0, c.0));
+                let (j, score) = nearest.next_back().unwrap_or(best);
                 found.insert(slot, j, score, said(j));
             }
         }

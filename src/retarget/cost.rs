@@ -14,8 +14,9 @@ pub(super) mod weight {
     pub const STANCE: f64 = 12.0;
     /// Points below the ground, per metre.
     pub const GROUND: f64 = 16.0;
-    /// Coordinates outside of their limits, per radian.
+    /// Coordinates outside of their limits, per radian: at first, and where some are left outside.
     pub const LIMIT: f64 = 3.0;
+    pub const STIFF_LIMITS: [f64; 2] = [30.0, 300.0];
     /// Every coordinate's distance from the guess, per radian; decides what nothing else does.
     pub const GUESS: f64 = 0.005;
     /// Root acceleration, per m/s².
@@ -33,6 +34,8 @@ pub(super) struct Problem<'a> {
     pub goals: &'a Goals,
     pub anchors: &'a [Vec<Anchor>],
     pub fps: f64,
+    /// Weight of a coordinate's distance outside of its limits, per radian.
+    pub limit: f64,
 }
 
 /// Where one frame's derivatives go: gradient, and the lower triangle of a row-major matrix.
@@ -177,7 +180,7 @@ impl Problem<'_> {
                     });
                     if r != Vector3::zeros() {
                         let rows = [r.x != 0.0, r.y != 0.0, r.z != 0.0];
-                        cost += turned(to, &v, &r, joint.dof, weight::LIMIT, rows);
+                        cost += turned(to, &v, &r, joint.dof, self.limit, rows);
                     }
                 }
                 JointKind::Hinge(_) | JointKind::Slide(_) => {
@@ -186,7 +189,7 @@ impl Problem<'_> {
                     let range = joint.limits.first().map(|range| within(*range));
                     let r = range.map_or(0.0, |range| limits::outside(value, range));
                     if r != 0.0 {
-                        cost += to.add_scalar(joint.dof, r, weight::LIMIT);
+                        cost += to.add_scalar(joint.dof, r, self.limit);
                     }
                 }
             }

@@ -6,7 +6,7 @@ use super::model::Model;
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::skeleton::Skeleton;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A point that follows the source: the origin of a body.
 #[derive(Clone, Copy, Debug)]
@@ -119,13 +119,7 @@ impl Goals {
         self.points.len()
     }
 
-    /// Moves everything.
-    pub fn shift(&mut self, by: &Vector3<f64>) {
-        for f in 0..self.frames() {
-            self.shift_frame(f, by);
-        }
-    }
-
+    /// Moves everything at frame `f`.
     pub fn shift_frame(&mut self, f: usize, by: &Vector3<f64>) {
         self.points[f].iter_mut().for_each(|p| *p += by);
         for i in 0..3 {
@@ -149,8 +143,6 @@ struct Builder<'a> {
     skeleton: &'a Skeleton,
     /// Place in `alignment.binds` of every body's bind.
     bind_of: Vec<Option<usize>>,
-    /// Middle between the hip joints, in the root's frame.
-    hip_middle: Vector3<f64>,
 }
 
 impl<'a> Builder<'a> {
@@ -159,24 +151,11 @@ impl<'a> Builder<'a> {
         for (i, bind) in alignment.binds.iter().enumerate() {
             bind_of[bind.body] = Some(i);
         }
-        let rest = skeleton.forward(&skeleton.rest_qpos());
-        let hip = |slot: Slot| {
-            skeleton
-                .slots
-                .get(&slot)
-                .map(|b| rest[*b].translation.vector)
-        };
-        let middle = match (hip(Slot::LeftUpperLeg), hip(Slot::RightUpperLeg)) {
-            (Some(left), Some(right)) => (left + right) / 2.0,
-            _ => rest[0].translation.vector,
-        };
-        let hip_middle = (rest[0].inverse() * nalgebra::Point3::from(middle)).coords;
         Builder {
             map,
             alignment,
             skeleton,
             bind_of,
-            hip_middle,
         }
     }
 
@@ -206,7 +185,7 @@ impl<'a> Builder<'a> {
         let facing = self
             .goal(0, rotations)
             .unwrap_or_else(UnitQuaternion::identity);
-        let root = Isometry3::from_parts((middle - facing * self.hip_middle).into(), facing);
+        let root = Isometry3::from_parts(Translation3::identity(), facing);
         let bodies = &self.skeleton.bodies;
         let mut world: Vec<UnitQuaternion<f64>> = vec![facing; bodies.len()];
         for (b, body) in bodies.iter().enumerate().skip(1) {
@@ -224,9 +203,8 @@ impl<'a> Builder<'a> {
                 (parent * body.rest.rotation).inverse() * world[b]
             };
             let turns: Vec<UnitQuaternion<f64>> = (0..bodies.len()).map(local).collect();
-            qpos = self
-                .skeleton
-                .rotations_to_qpos(&root, &turns, before.map(Vec::as_slice));
+            // No history: the same pose gives the same coordinates, wherever the clip begins.
+            qpos = self.skeleton.rotations_to_qpos(&root, &turns, None);
             limits::clamp_hinges(self.skeleton, &mut qpos);
             reached = self.skeleton.forward(&qpos);
             for (b, rotation) in world.iter_mut().enumerate().skip(1) {
@@ -235,7 +213,27 @@ impl<'a> Builder<'a> {
                 *rotation = free.unwrap_or(reached[b].rotation);
             }
         }
+        // The hips hang on the root by whatever joints the skeleton has there.
+        let shift = middle - self.hip_middle(&reached);
+        qpos[..3].copy_from_slice(shift.as_slice());
+        let shift = Translation3::from(shift);
+        reached.iter_mut().for_each(|body| *body = shift * *body);
+        if let Some(before) = before {
+            limits::unwrap(self.skeleton, before, &mut qpos);
+        }
         (qpos, reached)
+    }
+
+    /// Middle between the hip joints.
+    fn hip_middle(&self, bodies: &[Isometry3<f64>]) -> Vector3<f64> {
+        let hip = |slot: Slot| {
+            let body = self.skeleton.slots.get(&slot)?;
+            Some(bodies[*body].translation.vector)
+        };
+        match (hip(Slot::LeftUpperLeg), hip(Slot::RightUpperLeg)) {
+            (Some(left), Some(right)) => (left + right) / 2.0,
+            _ => bodies[0].translation.vector,
+        }
     }
 
     fn turns_freely(&self, body: usize) -> bool {

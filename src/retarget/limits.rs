@@ -88,3 +88,30 @@ pub(super) fn clamp_hinges(skeleton: &Skeleton, qpos: &mut [f64]) {
         }
     }
 }
+
+/// The same pose in the coordinates nearest to the frame before: hinges by whole turns inside of their ranges, and
+/// of a quaternion and its negative the nearer one.
+pub(super) fn unwrap(skeleton: &Skeleton, before: &[f64], qpos: &mut [f64]) {
+    for joint in skeleton.bodies.iter().flat_map(|body| &body.joints) {
+        let at = joint.qpos;
+        match joint.kind {
+            JointKind::Hinge(_) => {
+                let turned = qpos[at] + TAU * ((before[at] - qpos[at]) / TAU).round();
+                let range = joint.limits.first();
+                if range.is_none_or(|range| outside(turned, *range) == 0.0) {
+                    qpos[at] = turned;
+                }
+            }
+            JointKind::Free => same_side(before, qpos, at + 3),
+            JointKind::Ball => same_side(before, qpos, at),
+            JointKind::Slide(_) => {}
+        }
+    }
+}
+
+fn same_side(before: &[f64], qpos: &mut [f64], at: usize) {
+    let product: f64 = (at..at + 4).map(|i| before[i] * qpos[i]).sum();
+    if product < 0.0 {
+        qpos[at..at + 4].iter_mut().for_each(|x| *x = -*x);
+    }
+}

@@ -9,19 +9,24 @@ mod banded;
 mod cost;
 mod footing;
 mod goals;
+mod ground;
 mod limits;
 mod model;
+mod reach;
+mod reference;
 mod report;
 mod rotation;
 mod seam;
 mod solve;
+mod source;
 mod stance;
+mod system;
 mod travel;
 
 pub use report::{MappedJoint, Report, Spread};
 
 use crate::clip::{Clip, LoopMode};
-use crate::humanoid::{self, HumanoidMap, NotHumanoid};
+use crate::humanoid::{self, HumanoidMap, NotHumanoid, Slot};
 use crate::motion::{Cycle, Draft, Motion};
 use crate::skeleton::{JointKind, Skeleton};
 use cost::Problem;
@@ -29,6 +34,8 @@ use goals::Goals;
 use model::Model;
 use nalgebra::Vector3;
 use solve::Solver;
+use source::Source;
+use stance::Contacts;
 use std::time::Instant;
 
 /// How to retarget.
@@ -47,7 +54,7 @@ pub enum RetargetError {
         "the joint map puts joint number {joint} in slot `{slot}`, but the clip has only {count}"
     )]
     NoSuchJoint {
-        slot: humanoid::Slot,
+        slot: Slot,
         joint: usize,
         count: usize,
     },
@@ -108,27 +115,23 @@ pub fn retarget(
     let model = Model::new(skeleton);
     let mut goals = Goals::new(clip, &map, &alignment, &model);
     let leg = skeleton.leg_length();
+    let mut source = Source::new(clip, &map, &alignment, skeleton);
     let mut problems = clip.problems.clone();
-    if clip.loop_mode == LoopMode::Wrap {
-        problems.extend(travel::restore(&mut goals, &model, clip.fps, leg));
-    }
-    let soles = stance::soles(&model, &goals);
-    let ground = stance::ground(&soles, clip.fps, leg, clip.loop_mode);
-    let root = goals.root(0);
-    goals.shift(&Vector3::new(-root.x, -root.y, -ground));
+    problems.extend(restore_travel(clip, &model, &mut goals, &mut source));
+    let contacts = put_on_ground(clip, &model, &mut goals, &mut source);
     let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
     let cycle = wraps.then(|| seam::cycle(&goals, &model));
-    let faithful = goals.clone();
     if let Some(cycle) = &cycle {
         problems.extend(seam::gap_problem(&goals, &model));
         seam::close(&mut goals, cycle, &model, clip.fps);
     }
-    let anchors = stance::plant(&model, &mut goals, clip.fps, leg, cycle.as_ref());
+    let anchors = stance::plant(&model, &mut goals, &contacts, clip.fps, leg, cycle.as_ref());
     let problem = Problem {
         model: &model,
         goals: &goals,
         anchors: &anchors,
         fps: clip.fps,
+        limit: cost::weight::LIMIT,
     };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
     let contact_bodies = stance::contact_bodies(&model, &goals, &anchors);
@@ -149,13 +152,11 @@ pub fn retarget(
             report: serde_json::Value::Null,
         },
     );
-    let report = report::report(
-        &model,
-        &faithful,
-        &motion,
-        report::mapped(clip, &map),
-        problems,
-    );
+    let measured = stance::measured(&model, &goals, contacts, |end, f| {
+        source.is_still(end, f, clip.fps, leg)
+    });
+    let map = report::mapped(clip, &map);
+    let report = report::report(skeleton, &source, &measured, &motion, map, problems);
     motion.report = serde_json::to_value(&report).unwrap_or_default();
     Ok(Retargeted {
         motion,
@@ -163,6 +164,53 @@ pub fn retarget(
         seconds: start.elapsed().as_secs_f64(),
         iterations,
     })
+}
+
+/// Gives a clip on the spot the travel that its feet tell of; says so.
+fn restore_travel(
+    clip: &Clip,
+    model: &Model,
+    goals: &mut Goals,
+    source: &mut Source,
+) -> Option<crate::clip::Problem> {
+    let leg = model.skeleton.leg_length();
+    let velocity = travel::missing(goals, model, clip.fps, leg, clip.loop_mode)?;
+    for f in 0..goals.frames() {
+        let by = velocity * (f as f64 / clip.fps);
+        goals.shift_frame(f, &by);
+        source.shift_frame(f, &by);
+    }
+    Some(travel::problem(&velocity))
+}
+
+/// Moves goals and source to where the ground is z = 0 and the root starts above the origin, and sets hands down.
+/// Returns when the source's feet and hands stand.
+fn put_on_ground(
+    clip: &Clip,
+    model: &Model,
+    goals: &mut Goals,
+    source: &mut Source,
+) -> Vec<Contacts> {
+    let (fps, leg, loop_mode) = (clip.fps, model.skeleton.leg_length(), clip.loop_mode);
+    let ankle = ankle_height(model.skeleton);
+    let lift = source.ankle.map(|height| height - ankle);
+    let points = stance::ground_points(model, goals);
+    let ground = ground::find(&points, lift, fps, leg, loop_mode);
+    drop(points);
+    let contact = |end: Slot| source.contact(end, ground.floor, fps, leg, ankle, loop_mode);
+    let ends = source::ENDS.iter().map(|(end, _)| *end);
+    let contacts: Vec<Contacts> = ends.filter_map(|end| Some((end, contact(end)?))).collect();
+    let is_hand = |contacts: &&Contacts| source::HANDS.contains(&contacts.0);
+    for hand in contacts.iter().filter(is_hand) {
+        reach::set_down(goals, source, hand, &ground, fps);
+    }
+    let root = goals.root(0);
+    let home = Vector3::new(-root.x, -root.y, -ground.floor - ground.lift);
+    for f in 0..goals.frames() {
+        goals.shift_frame(f, &home);
+        source.shift_frame(f, &home);
+    }
+    contacts
 }
 
 /// Fewest steps in a cycle; a clip with fewer ends where it ends.
@@ -180,8 +228,17 @@ fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
         frames.pop();
     }
     let iterations = Solver::new(problem, cycle).run(&mut frames);
+    // Clamping moves feet, so it should have nothing left to do.
+    let skeleton = problem.model.skeleton;
+    let is_outside = |qpos: &[f64]| limits::violations(skeleton, qpos) > 0;
+    for limit in cost::weight::STIFF_LIMITS {
+        if frames.iter().any(|qpos| is_outside(qpos)) {
+            let stiff = Problem { limit, ..*problem };
+            Solver::new(&stiff, cycle).mend(&mut frames, is_outside);
+        }
+    }
     for qpos in &mut frames {
-        limits::clamp(problem.model.skeleton, qpos);
+        limits::clamp(skeleton, qpos);
     }
     if let (Some(cycle), Some(first)) = (cycle, frames.first()) {
         let turn = rotation::exp(&(Vector3::z() * cycle.heading)).to_rotation_matrix();
@@ -189,6 +246,16 @@ fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
         frames.push(last);
     }
     (frames, iterations)
+}
+
+/// Height of the skeleton's ankles above its soles in its rest pose.
+fn ankle_height(skeleton: &Skeleton) -> f64 {
+    let rest = skeleton.forward(&skeleton.rest_qpos());
+    let heights: Vec<f64> = [Slot::LeftFoot, Slot::RightFoot]
+        .iter()
+        .filter_map(|slot| Some(rest[*skeleton.slots.get(slot)?].translation.z))
+        .collect();
+    heights.iter().sum::<f64>() / heights.len().max(1) as f64
 }
 
 fn joint_map(clip: &Clip, options: &Options) -> Result<HumanoidMap, RetargetError> {

@@ -10,6 +10,8 @@ pub(super) struct Knob {
     pub body: usize,
     pub center: Vector3<f64>,
     pub radius: f64,
+    /// Whether a foot stands on it: not so the upper corners of a box.
+    pub sole: bool,
 }
 
 pub(super) struct Model<'a> {
@@ -48,6 +50,7 @@ impl<'a> Model<'a> {
         let mut chains: Vec<Vec<usize>> = Vec::with_capacity(skeleton.bodies.len());
         let mut turns = vec![true; skeleton.nv];
         let mut knobs = Vec::new();
+        let rest = skeleton.forward(&skeleton.rest_qpos());
         for (b, body) in skeleton.bodies.iter().enumerate() {
             let mut chain = body.parent.map_or_else(Vec::new, |p| chains[p].clone());
             for joint in &body.joints {
@@ -60,7 +63,7 @@ impl<'a> Model<'a> {
             }
             chain.sort_unstable();
             chains.push(chain);
-            knobs.extend(body.shapes.iter().flat_map(|shape| shape_knobs(b, shape)));
+            knobs.extend(body.shapes.iter().flat_map(|s| shape_knobs(b, &rest[b], s)));
         }
         Model {
             skeleton,
@@ -194,31 +197,25 @@ fn turned(before: &Isometry3<f64>, joint: &Joint, turn: UnitQuaternion<f64>) -> 
     before * Isometry3::from_parts(shift.into(), turn)
 }
 
-fn shape_knobs(body: usize, shape: &Shape) -> Vec<Knob> {
+fn shape_knobs(body: usize, rest: &Isometry3<f64>, shape: &Shape) -> Vec<Knob> {
+    let round = |center: &Vector3<f64>, radius: f64| Knob {
+        body,
+        center: *center,
+        radius,
+        sole: true,
+    };
     match shape {
-        Shape::Sphere { center, radius } => {
-            vec![Knob {
-                body,
-                center: *center,
-                radius: *radius,
-            }]
-        }
-        Shape::Capsule { a, b, radius } => [a, b]
-            .map(|end| Knob {
-                body,
-                center: *end,
-                radius: *radius,
-            })
-            .into(),
+        Shape::Sphere { center, radius } => vec![round(center, *radius)],
+        Shape::Capsule { a, b, radius } => [a, b].map(|end| round(end, *radius)).into(),
         Shape::Box { pose, half } => (0..8)
             .map(|i: usize| {
                 let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
                 let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
-                let center = (pose * nalgebra::Point3::from(corner)).coords;
                 Knob {
                     body,
-                    center,
+                    center: (pose * nalgebra::Point3::from(corner)).coords,
                     radius: 0.0,
+                    sole: (rest.rotation * (pose.rotation * corner)).z <= 0.0,
                 }
             })
             .collect(),

@@ -1,17 +1,14 @@
-//! How good a retargeted motion is, from the motion and its goals alone.
+//! How good a retargeted motion is, from the motion and its source alone: the solver's goals and anchors have no say.
 
-use super::goals::Goals;
 use super::limits;
-use super::model::{Knob, Model};
-use crate::clip::{Clip, Problem};
+use super::reference::Reference;
+use super::source::Source;
+use crate::clip::{Clip, Problem, Severity};
 use crate::humanoid::{HumanoidMap, Slot};
-use crate::motion::Motion;
+use crate::motion::{Motion, skate::sole_speed};
 use crate::skeleton::Skeleton;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
-
-/// Points this little above a body's lowest point touch the ground with it, metres.
-const TOUCHING: f64 = 0.005;
 
 /// Mean and greatest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -48,13 +45,14 @@ pub struct MappedJoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     pub frames: usize,
-    /// Distance of hips, shoulders, elbows, wrists, knees and ankles from the scaled source's, metres.
+    /// Distance of hips, shoulders, elbows, wrists, knees and ankles from the source's, scaled limb by limb, metres.
     pub keypoint_error_m: Spread,
-    /// Mean horizontal speed of bodies in contact, each at the point on the ground that moves least, m/s.
+    /// Mean horizontal speed of feet and hands while the source's stand, each at the point on the ground that moves
+    /// least, m/s.
     pub foot_skate_m_s: f64,
     /// Depth of the lowest point below the ground, per frame, metres.
     pub penetration_m: Spread,
-    /// Mean height above the ground of bodies in contact, metres.
+    /// Mean height above the ground of feet and hands while the source's stand, metres.
     pub float_m: f64,
     /// Coordinates outside of their limits, summed over frames.
     pub joint_limit_violations: usize,
@@ -62,21 +60,29 @@ pub struct Report {
     pub problems: Vec<Problem>,
 }
 
-/// Measures a motion against the goals of its frames.
+/// A foot or hand with what hangs on it, and whether the source's stands, by frame.
+pub(super) struct Contact {
+    pub bodies: Vec<usize>,
+    pub stands: Vec<bool>,
+}
+
+/// Measures a motion against its source, which stands where the motion does.
 pub(super) fn report(
-    model: &Model,
-    goals: &Goals,
+    skeleton: &Skeleton,
+    source: &Source,
+    contacts: &[Contact],
     motion: &Motion,
     map: Vec<MappedJoint>,
-    problems: Vec<Problem>,
+    mut problems: Vec<Problem>,
 ) -> Report {
-    let skeleton = model.skeleton;
+    problems.extend(uncertain(&map));
+    problems.extend(no_stance(contacts));
     Report {
         frames: motion.qpos.len(),
-        keypoint_error_m: keypoint_error(goals, &motion.bodies),
-        foot_skate_m_s: foot_skate(model, motion),
+        keypoint_error_m: keypoint_error(skeleton, source, &motion.bodies),
+        foot_skate_m_s: foot_skate(skeleton, contacts, motion),
         penetration_m: penetration(skeleton, &motion.bodies),
-        float_m: float(skeleton, motion),
+        float_m: float(skeleton, contacts, motion),
         joint_limit_violations: motion
             .qpos
             .iter()
@@ -85,6 +91,35 @@ pub(super) fn report(
         map,
         problems,
     }
+}
+
+/// Confidence below which a joint's place in the map should be looked at.
+const UNCERTAIN: f64 = 0.6;
+
+fn uncertain(map: &[MappedJoint]) -> Option<Problem> {
+    let doubtful: Vec<String> = map
+        .iter()
+        .filter(|joint| joint.confidence < UNCERTAIN)
+        .map(|joint| format!("`{}` as {}", joint.joint, joint.slot))
+        .collect();
+    (!doubtful.is_empty()).then(|| Problem {
+        id: "map-uncertain".to_owned(),
+        severity: Severity::Warning,
+        message: format!(
+            "names don't say which joints some of these are: {}. Check them, and give a map file where one is wrong",
+            doubtful.join(", ")
+        ),
+    })
+}
+
+fn no_stance(contacts: &[Contact]) -> Option<Problem> {
+    let stands = contacts.iter().any(|c| c.stands.contains(&true));
+    (!stands).then(|| Problem {
+        id: "no-stance".to_owned(),
+        severity: Severity::Warning,
+        message: "no foot or hand stands on the ground in any frame, so skating and floating say nothing; is the                   ground of the clip at z = 0?"
+            .to_owned(),
+    })
 }
 
 pub(super) fn mapped(clip: &Clip, map: &HumanoidMap) -> Vec<MappedJoint> {
@@ -99,11 +134,14 @@ pub(super) fn mapped(clip: &Clip, map: &HumanoidMap) -> Vec<MappedJoint> {
     named.collect()
 }
 
-fn keypoint_error(goals: &Goals, bodies: &[Vec<Isometry3<f64>>]) -> Spread {
-    let frames = bodies.iter().zip(&goals.points);
-    Spread::of(frames.flat_map(|(bodies, points)| {
-        let keys = goals.keys.iter().zip(points);
-        keys.map(|(key, goal)| (bodies[key.body].translation.vector - goal).norm())
+fn keypoint_error(skeleton: &Skeleton, source: &Source, bodies: &[Vec<Isometry3<f64>>]) -> Spread {
+    let reference = Reference::new(source, skeleton);
+    Spread::of(bodies.iter().enumerate().flat_map(|(f, bodies)| {
+        let places = reference.places(source, f).into_iter();
+        places.filter_map(|(slot, place)| {
+            let body = skeleton.slots.get(&slot)?;
+            Some((bodies[*body].translation.vector - place).norm())
+        })
     }))
 }
 
@@ -115,52 +153,41 @@ fn penetration(skeleton: &Skeleton, bodies: &[Vec<Isometry3<f64>>]) -> Spread {
     )
 }
 
-/// Pairs of contact body and frame in contact.
-fn contacts(motion: &Motion) -> impl Iterator<Item = (usize, usize)> + '_ {
-    let tracks = motion.tracks.contact.iter().enumerate();
-    tracks.flat_map(move |(f, contact)| {
-        let standing = motion.contact_bodies.iter().zip(contact);
-        standing
-            .filter(|(_, stands)| **stands)
-            .map(move |(body, _)| (f, *body))
-    })
+/// Frames in which a contact stands.
+fn standing(contact: &Contact) -> impl Iterator<Item = usize> + '_ {
+    let flags = contact.stands.iter().enumerate();
+    flags.filter(|(_, stands)| **stands).map(|(f, _)| f)
 }
 
-fn float(skeleton: &Skeleton, motion: &Motion) -> f64 {
-    let height = |(f, body): (usize, usize)| {
-        skeleton
-            .lowest_point_of(&motion.bodies[f], &[body])
-            .max(0.0)
-    };
-    Spread::of(contacts(motion).map(height)).mean
+fn float(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
+    let height = |f: usize, bodies: &[usize]| skeleton.lowest_point_of(&motion.bodies[f], bodies);
+    let heights = contacts
+        .iter()
+        .flat_map(|c| standing(c).map(move |f| height(f, &c.bodies).max(0.0)));
+    Spread::of(heights).mean
 }
 
-/// Over all contacts that last to the next frame: how fast the point on the ground that moves least moves along it.
-/// A foot that turns about a point that rests doesn't skate.
-fn foot_skate(model: &Model, motion: &Motion) -> f64 {
-    let stays = |f: usize, body: usize| {
-        let place = motion.contact_bodies.iter().position(|b| *b == body);
-        let next = motion.tracks.contact.get(f + 1);
-        place.zip(next).is_some_and(|(c, contact)| contact[c])
-    };
-    let speeds = contacts(motion)
-        .filter(|(f, body)| stays(*f, *body))
-        .filter_map(|(f, body)| {
-            let place = |f: usize, knob: &Knob| motion.bodies[f][body] * Point3::from(knob.center);
-            let sole = |knob: &Knob| place(f, knob).z - knob.radius;
-            let knobs: Vec<&Knob> = model
-                .knobs
-                .iter()
-                .filter(|knob| knob.body == body)
-                .collect();
-            let lowest = knobs
-                .iter()
-                .map(|knob| sole(knob))
-                .fold(f64::INFINITY, f64::min);
-            let down = knobs.iter().filter(|knob| sole(knob) < lowest + TOUCHING);
-            let speed =
-                |knob: &&Knob| (place(f + 1, knob) - place(f, knob)).xy().norm() * motion.fps;
-            down.map(speed).min_by(f64::total_cmp)
+/// A foot's speed from a frame to the next is that of the lowest of its bodies.
+fn foot_skate(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
+    let qpos = &motion.qpos;
+    let mut twists = vec![None; qpos.len()];
+    let pairs = contacts
+        .iter()
+        .flat_map(|c| standing(c).map(move |f| (c, f)))
+        .filter(|(_, f)| f + 1 < qpos.len());
+    let speeds = pairs.filter_map(|(contact, f)| {
+        let poses = &motion.bodies[f];
+        let twists = twists[f].get_or_insert_with(|| {
+            let onward = skeleton.differentiate(&qpos[f], &qpos[f + 1], 1.0 / motion.fps);
+            skeleton.twists(&qpos[f], &onward)
         });
+        let height = |b: &usize| skeleton.lowest_point_of(poses, &[*b]);
+        let lowest = contact
+            .bodies
+            .iter()
+            .min_by(|a, b| height(a).total_cmp(&height(b)))?;
+        let shapes = &skeleton.bodies[*lowest].shapes;
+        Some(sole_speed(shapes, &poses[*lowest], &twists[*lowest]))
+    });
     Spread::of(speeds).mean
 }

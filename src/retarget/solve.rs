@@ -1,16 +1,24 @@
-//! The whole trajectory in one least-squares problem: Levenberg–Marquardt over all frames at once.
+//! The whole trajectory in one least-squares problem: Levenberg–Marquardt over all frames at once, or, where these
+//! are many, over one window of them after the other.
 
-use super::banded::Pentadiagonal;
-use super::cost::{Normal, Part, Problem, bend, parts};
-use super::model::Pose;
+use super::cost::{Part, Problem, parts};
 use super::rotation::exp;
+use super::system::{Step, System, Window};
 use crate::motion::Cycle;
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
-/// Most steps.
+/// Most steps over a window.
 const ITERATIONS: usize = 15;
 /// Relative gain below which the search ends.
 const GAIN: f64 = 1e-3;
+/// A frame of which no coordinate changes by more in a step stands still, m or radians.
+const STILL: f64 = 3e-4;
+/// Longest step of a frame, radians or metres: a longer one can carry a limb over into another way of bending.
+const FARTHEST: f64 = 0.5;
+/// Time around a frame that still moves in which others are solved with it, s, and most frames of it.
+const REACH: f64 = 0.2;
+const MOST_REACH: usize = 200;
 /// Damping at the start, relative to the mean diagonal.
 const DAMPING: f64 = 1e-5;
 /// Damping at which a step that gains nothing ends the search.
@@ -20,28 +28,27 @@ const ON_GAIN: f64 = 0.3;
 const ON_LOSS: f64 = 30.0;
 /// Rounds in which the seam of a cycle is brought into a step.
 const SEAM_ROUNDS: usize = 4;
+/// Memory for a window's equations, bytes: about 2,300 frames of a humanoid.
+const MEMORY: usize = 64 << 20;
+/// Time by which a window reaches back into the one before, so that those frames see what comes after them, s.
+const OVERLAP: f64 = 1.0;
+/// Fewest frames in a window, whatever the skeleton.
+const SHORTEST_WINDOW: usize = 64;
 
-/// A coupling across the seam of a cycle: rows of one frame, columns of another.
-struct Corner {
-    row: usize,
-    column: usize,
-    block: Matrix3<f64>,
-    size: usize,
-}
-
-/// Derivatives of the whole cost.
-struct System {
-    band: Pentadiagonal,
-    gradient: Vec<f64>,
-    corners: Vec<Corner>,
+/// What a search did: its steps, and how far each frame went in the last one that gained.
+struct Improved {
+    steps: usize,
+    moved: Vec<f64>,
 }
 
 pub(super) struct Solver<'a> {
     problem: &'a Problem<'a>,
     parts: Vec<Part>,
-    /// Turn from a cycle to the next, and its shift, for a trajectory that repeats.
-    cycle: Option<(Matrix3<f64>, Vector3<f64>)>,
+    /// For a trajectory that repeats.
+    cycle: Option<Step>,
     n: usize,
+    /// Most frames in a window.
+    longest: usize,
 }
 
 impl<'a> Solver<'a> {
@@ -50,245 +57,163 @@ impl<'a> Solver<'a> {
             let turn = exp(&(Vector3::z() * c.heading)).to_rotation_matrix();
             (*turn.matrix(), c.translation)
         };
+        let n = problem.model.skeleton.nv;
         Solver {
             problem,
             parts: parts(problem.model),
             cycle: cycle.map(step),
-            n: problem.model.skeleton.nv,
+            n,
+            longest: (MEMORY / (24 * n * n).max(1)).max(SHORTEST_WINDOW),
         }
     }
 
-    /// Improves `frames` until nothing is gained any more; returns the number of steps taken.
-    pub fn run(&self, frames: &mut Vec<Vec<f64>>) -> usize {
-        let count = frames.len();
-        let mut system = self.empty(count);
+    /// Improves `frames` until nothing is gained any more; returns the number of steps taken over a window.
+    pub fn run(&self, frames: &mut [Vec<f64>]) -> usize {
+        let mut most = 0;
+        for window in self.windows(frames.len()) {
+            let rough = self.improve(frames, window, |gain, _| gain < GAIN);
+            most = most.max(rough.steps);
+            self.settle(frames, window, &rough.moved);
+        }
+        most
+    }
+
+    /// Solves again around the frames that are wrong; the others are taken to stand still.
+    pub fn mend(&self, frames: &mut [Vec<f64>], is_wrong: impl Fn(&[f64]) -> bool) {
+        for window in self.windows(frames.len()) {
+            let moved = |f: usize| if is_wrong(&frames[f]) { f64::MAX } else { 0.0 };
+            let moved: Vec<f64> = window.frames().map(moved).collect();
+            self.settle(frames, window, &moved);
+        }
+    }
+
+    /// Goes on where frames still move. The rest of a clip has no say in when a part of it is done, so that a part
+    /// becomes the same in a longer or shorter clip.
+    fn settle(&self, frames: &mut [Vec<f64>], window: Window, moved: &[f64]) {
+        let reach = ((REACH * self.problem.fps).ceil() as usize).clamp(2, MOST_REACH);
+        for part in restless(moved, reach) {
+            let start = (window.start + part.start) % window.total;
+            let count = part.len();
+            let part = Window {
+                start,
+                count,
+                ..window
+            };
+            self.improve(frames, part, |_, moved| moved < STILL);
+        }
+    }
+
+    /// Windows that overlap, in order of time; one that repeats ends with a window over its seam.
+    pub fn windows(&self, total: usize) -> impl Iterator<Item = Window> + use<> {
+        let repeats = self.cycle.is_some();
+        let longest = self.longest;
+        let second = (OVERLAP * self.problem.fps).ceil() as usize;
+        let overlap = second.clamp(2, longest / 4);
+        let window = move |start: usize, count: usize| Window {
+            start,
+            count,
+            total,
+            repeats,
+        };
+        let starts = (0..total.saturating_sub(overlap).max(1)).step_by(longest - overlap);
+        let along = starts.map(move |start| window(start, longest.min(total - start)));
+        let seam = (repeats && total > longest).then(|| window(total - overlap, 2 * overlap));
+        along.chain(seam).filter(|window| window.count > 0)
+    }
+
+    /// Levenberg–Marquardt over a window until `done`, told the relative gain of a step and the largest change of a
+    /// coordinate.
+    fn improve(
+        &self,
+        frames: &mut [Vec<f64>],
+        window: Window,
+        done: impl Fn(f64, f64) -> bool,
+    ) -> Improved {
+        let mut system = System::new(self.n, window);
         let mut cost = self.assemble(frames, &mut system);
         let mut damping = DAMPING;
-        for step in 0..ITERATIONS {
-            let Some(trial) = self.trial(frames, &mut system, damping) else {
-                damping *= ON_LOSS;
-                self.assemble(frames, &mut system);
-                continue;
-            };
-            let trial_cost = self.assemble(&trial, &mut system);
-            if trial_cost < cost {
+        let mut improved = Improved {
+            steps: 0,
+            moved: vec![0.0; window.count],
+        };
+        while improved.steps < ITERATIONS {
+            improved.steps += 1;
+            let before: Vec<Vec<f64>> = window.frames().map(|f| frames[f].clone()).collect();
+            let moved = self.step(frames, &mut system, damping);
+            let trial = moved.map(|moved| (moved, self.assemble(frames, &mut system)));
+            if let Some((moved, trial_cost)) = trial.filter(|(_, trial)| *trial < cost) {
                 let gain = (cost - trial_cost) / cost;
-                (*frames, cost) = (trial, trial_cost);
+                let most = moved.iter().copied().fold(0.0, f64::max);
+                cost = trial_cost;
                 damping *= ON_GAIN;
-                if gain < GAIN {
-                    return step + 1;
+                improved.moved = moved;
+                if done(gain, most) {
+                    break;
                 }
+                continue;
+            }
+            for (f, qpos) in window.frames().zip(before) {
+                frames[f] = qpos;
+            }
+            if damping > STIFF {
+                break;
+            }
+            damping *= ON_LOSS;
+            self.assemble(frames, &mut system);
+        }
+        improved
+    }
+
+    /// Moves the window's frames by a damped Gauss–Newton step, and tells how far each went; `None` if there is no
+    /// such step. Uses the system up.
+    fn step(&self, frames: &mut [Vec<f64>], system: &mut System, damping: f64) -> Option<Vec<f64>> {
+        system.damp(damping);
+        let x = system.solve(SEAM_ROUNDS)?;
+        let mut moved = Vec::with_capacity(system.window.count);
+        for (f, step) in system.window.frames().zip(x.chunks_exact(self.n)) {
+            let most = step.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if most > FARTHEST {
+                let shorter: Vec<f64> = step.iter().map(|x| x * FARTHEST / most).collect();
+                self.problem.model.step(&mut frames[f], &shorter);
             } else {
-                if damping > STIFF {
-                    return step + 1;
-                }
-                damping *= ON_LOSS;
-                self.assemble(frames, &mut system);
+                self.problem.model.step(&mut frames[f], step);
             }
+            moved.push(most);
         }
-        ITERATIONS
+        let mut coordinates = system.window.frames().flat_map(|f| &frames[f]);
+        coordinates.all(|v| v.is_finite()).then_some(moved)
     }
 
-    /// The frames after a damped Gauss–Newton step. Uses the system up.
-    fn trial(
-        &self,
-        frames: &[Vec<f64>],
-        system: &mut System,
-        damping: f64,
-    ) -> Option<Vec<Vec<f64>>> {
-        let (n, count) = (self.n, frames.len());
-        let size = n * n;
-        let diagonal = |f: usize, i: usize| f * size + i * n + i;
-        let total: f64 = (0..count)
-            .map(|f| {
-                (0..n)
-                    .map(|i| system.band.diagonal[diagonal(f, i)])
-                    .sum::<f64>()
-            })
-            .sum();
-        let added = damping * total / (n * count) as f64;
-        for f in 0..count {
-            for i in 0..n {
-                system.band.diagonal[diagonal(f, i)] += added;
-            }
-        }
-        if !system.band.factor() {
-            return None;
-        }
-        let mut x: Vec<f64> = system.gradient.iter().map(|g| -g).collect();
-        system.band.solve(&mut x);
-        if !system.corners.is_empty() {
-            self.close_seam(system, &mut x);
-        }
-        let mut trial = frames.to_vec();
-        for (qpos, step) in trial.iter_mut().zip(x.chunks_exact(n)) {
-            self.problem.model.step(qpos, step);
-        }
-        trial
-            .iter()
-            .flatten()
-            .all(|v| v.is_finite())
-            .then_some(trial)
-    }
-
-    /// Brings the couplings across the seam into the solution `x` of the band M: with the couplings C, x ← M⁻¹(b − C x)
-    /// converges, because M − C is positive definite as M + C is.
-    fn close_seam(&self, system: &System, x: &mut Vec<f64>) {
-        for _ in 0..SEAM_ROUNDS {
-            let mut right: Vec<f64> = system.gradient.iter().map(|g| -g).collect();
-            for corner in &system.corners {
-                for i in 0..corner.size {
-                    for k in 0..corner.size {
-                        let value = corner.block[(i, k)];
-                        right[corner.row + i] -= value * x[corner.column + k];
-                        right[corner.column + k] -= value * x[corner.row + i];
-                    }
-                }
-            }
-            system.band.solve(&mut right);
-            *x = right;
-        }
-    }
-
-    /// Fills the system at `frames`; returns the cost.
     fn assemble(&self, frames: &[Vec<f64>], system: &mut System) -> f64 {
-        let size = self.n * self.n;
-        system.band.clear();
-        system.gradient.fill(0.0);
-        system.corners.clear();
-        let mut pose: Pose = self.problem.model.empty_pose();
-        let mut cost = 0.0;
-        for (f, qpos) in frames.iter().enumerate() {
-            let mut normal = Normal {
-                gradient: &mut system.gradient[f * self.n..(f + 1) * self.n],
-                matrix: &mut system.band.diagonal[f * size..(f + 1) * size],
-            };
-            cost += self.problem.frame(f, qpos, &mut pose, &mut normal);
-        }
-        cost + self.smoothness(frames, system)
+        system.assemble(self.problem, &self.parts, self.cycle.as_ref(), frames)
     }
 
     /// For tests against differences.
     #[cfg(test)]
-    pub fn cost_and_gradient(&self, frames: &[Vec<f64>]) -> (f64, Vec<f64>) {
-        let mut system = self.empty(frames.len());
+    pub fn cost_and_gradient(&self, frames: &[Vec<f64>], window: Window) -> (f64, Vec<f64>) {
+        let mut system = System::new(self.n, window);
         let cost = self.assemble(frames, &mut system);
         (cost, system.gradient)
     }
 
-    fn empty(&self, count: usize) -> System {
-        System {
-            band: Pentadiagonal::new(self.n, count),
-            gradient: vec![0.0; self.n * count],
-            corners: Vec::new(),
-        }
+    #[cfg(test)]
+    pub fn with_windows_of(mut self, longest: usize) -> Self {
+        self.longest = longest;
+        self
     }
+}
 
-    /// Tangent vectors from every frame to the next; a cycle's last leads to the first, carried on.
-    fn steps(&self, frames: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let mut steps = Vec::with_capacity(frames.len());
-        let mut add = |a: &[f64], b: &[f64]| {
-            let mut step = vec![0.0; self.n];
-            self.problem.model.difference(a, b, &mut step);
-            steps.push(step);
-        };
-        for pair in frames.windows(2) {
-            add(&pair[0], &pair[1]);
-        }
-        if let (Some((turn, shift)), Some(first), Some(last)) =
-            (self.cycle, frames.first(), frames.last())
-        {
-            add(last, &carried(first, &turn, &shift));
-        }
-        steps
-    }
-
-    /// Penalty on accelerations: couples each frame to its two neighbours.
-    fn smoothness(&self, frames: &[Vec<f64>], system: &mut System) -> f64 {
-        let count = frames.len();
-        let steps = self.steps(frames);
-        let mut cost = 0.0;
-        let rate = self.problem.fps * self.problem.fps;
-        let range = if self.cycle.is_some() {
-            0..count
-        } else {
-            1..count.saturating_sub(1)
-        };
-        for f in range {
-            let at = [(f + count - 1) % count, f, (f + 1) % count];
-            for part in &self.parts {
-                let mut bend = bend(part, &steps[at[0]], &steps[f]);
-                self.carry(part, f, count, &steps, &mut bend);
-                let square = (part.weight * rate).powi(2);
-                cost += 0.5 * square * bend.r.norm_squared();
-                for i in 0..3 {
-                    let column = bend.by[i].transpose() * square;
-                    let gradient = column * bend.r;
-                    for d in 0..part.size {
-                        system.gradient[at[i] * self.n + part.dof + d] += gradient[d];
-                    }
-                    for k in i..3 {
-                        self.couple(system, part, (at[i], at[k], k - i), &(column * bend.by[k]));
-                    }
-                }
-            }
-        }
-        cost
-    }
-
-    /// At the seam the root's shift is seen from the cycle that frame `f` is in.
-    fn carry(
-        &self,
-        part: &Part,
-        f: usize,
-        count: usize,
-        steps: &[Vec<f64>],
-        bend: &mut super::cost::Bend,
-    ) {
-        let Some((turn, _)) = self.cycle.filter(|_| !part.turns && part.size == 3) else {
-            return;
-        };
-        if f == 0 {
-            let last = super::model::vector(&steps[count - 1], part.dof);
-            let out = super::model::vector(&steps[0], part.dof);
-            bend.r = out - turn.transpose() * last;
-            bend.by[0] = turn.transpose();
-        }
-        if f + 1 == count {
-            bend.by[2] = turn;
+/// Runs of frames that moved, and those within `reach` of them.
+fn restless(moved: &[f64], reach: usize) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for (f, _) in moved.iter().enumerate().filter(|(_, m)| **m > STILL) {
+        let (from, to) = (f.saturating_sub(reach), (f + reach + 1).min(moved.len()));
+        match runs.last_mut() {
+            Some(run) if from <= run.end => run.end = to,
+            _ => runs.push(from..to),
         }
     }
-
-    /// Adds a block between two frames, `ahead` apart in time.
-    fn couple(
-        &self,
-        system: &mut System,
-        part: &Part,
-        (a, b, ahead): (usize, usize, usize),
-        block: &Matrix3<f64>,
-    ) {
-        let (n, size) = (self.n, self.n * self.n);
-        let blocks = match ahead {
-            0 => &mut system.band.diagonal,
-            1 if b == a + 1 => &mut system.band.next,
-            2 if b == a + 2 => &mut system.band.second,
-            _ => {
-                let (row, column) = (a * n + part.dof, b * n + part.dof);
-                system.corners.push(Corner {
-                    row,
-                    column,
-                    block: *block,
-                    size: part.size,
-                });
-                return;
-            }
-        };
-        for i in 0..part.size {
-            for k in 0..part.size {
-                blocks[a * size + (part.dof + i) * n + part.dof + k] += block[(i, k)];
-            }
-        }
-    }
+    runs
 }
 
 /// Coordinates moved on by a cycle.

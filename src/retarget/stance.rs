@@ -1,8 +1,10 @@
-//! Which points of feet and hands rest on the ground when, and where; and how high the ground is.
+//! Which points of feet and hands rest on the ground when, and where.
 
 use super::footing;
 use super::goals::Goals;
+use super::ground::Points;
 use super::model::{Model, Pose};
+use super::report::Contact;
 use crate::clip::LoopMode;
 use crate::humanoid::Slot;
 use crate::motion::{Cycle, contact};
@@ -32,6 +34,17 @@ const HANDS: [Slot; 2] = [Slot::LeftHand, Slot::RightHand];
 /// Heights, in leg lengths, up to which a standing point is held fully, and from which on not at all.
 const HELD: [f64; 2] = [0.015, 0.05];
 
+/// The same for hands, whose source's wrists stay above the ground.
+const HAND_HELD: [f64; 2] = [0.12, 0.2];
+/// A hand stands on what is this near to its lowest point, metres.
+const PALM: f64 = 0.02;
+/// Speed at which a standing point has a third of the say of one at rest in where it stands, leg lengths per second.
+const SLOW: f64 = 0.08;
+/// Distances from its place at which a standing point begins to go with the source, and does so wholly, leg lengths.
+const SLIDES: [f64; 2] = [0.08, 0.14];
+/// Time at rest from whose mean the place of a stance follows, s.
+const LAST: f64 = 0.5;
+
 fn limbs(model: &Model, goals: &Goals) -> Vec<Limb> {
     let slots = FEET
         .into_iter()
@@ -41,7 +54,10 @@ fn limbs(model: &Model, goals: &Goals) -> Vec<Limb> {
         .filter_map(|(slot, is_foot)| {
             let key = goals.keys.iter().position(|key| key.slot == slot)?;
             let body = goals.keys[key].body;
-            let carried = |k: &usize| under(model, body, model.knobs[*k].body);
+            let carried = |k: &usize| {
+                let knob = &model.knobs[*k];
+                under(model, body, knob.body) && (knob.sole || !is_foot)
+            };
             let knobs = (0..model.knobs.len()).filter(carried).collect();
             Some(Limb {
                 key,
@@ -75,6 +91,27 @@ pub(super) fn contact_bodies(model: &Model, goals: &Goals, anchors: &[Vec<Anchor
     }
     bodies.sort_unstable();
     bodies
+}
+
+/// The source's contacts on the skeleton's bodies, as far as the source stands still in them.
+pub(super) fn measured(
+    model: &Model,
+    goals: &Goals,
+    contacts: Vec<Contacts>,
+    is_still: impl Fn(Slot, usize) -> bool,
+) -> Vec<Contact> {
+    let limbs = limbs(model, goals);
+    let on_bodies = |(slot, stands): Contacts| {
+        let limb = limbs.iter().find(|l| goals.keys[l.key].slot == slot)?;
+        let mut bodies: Vec<usize> = limb.knobs.iter().map(|k| model.knobs[*k].body).collect();
+        bodies.dedup();
+        let stands = stands.iter().enumerate();
+        let stands = stands
+            .map(|(f, stands)| *stands && is_still(slot, f))
+            .collect();
+        Some(Contact { bodies, stands })
+    };
+    contacts.into_iter().filter_map(on_bodies).collect()
 }
 
 /// Weight from which on an anchor means contact.
@@ -115,13 +152,10 @@ fn paths(model: &Model, goals: &Goals, limbs: &[Limb]) -> Vec<Vec<Vec<Vector3<f6
 
 /// `soles[f][k]`: every foot knob's lowest point.
 pub(super) fn soles(model: &Model, goals: &Goals) -> Vec<Vec<Vector3<f64>>> {
-    let limbs: Vec<Limb> = limbs(model, goals)
-        .into_iter()
-        .filter(|l| l.is_foot)
-        .collect();
-    let paths = paths(model, goals, &limbs);
+    let mut feet = limbs(model, goals);
+    feet.retain(|limb| limb.is_foot);
     let mut soles: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); goals.frames()];
-    for (limb, paths) in limbs.iter().zip(&paths) {
+    for (limb, paths) in feet.iter().zip(&paths(model, goals, &feet)) {
         for (knob, path) in limb.knobs.iter().zip(paths) {
             let down = Vector3::z() * model.knobs[*knob].radius;
             for (f, p) in path.iter().enumerate() {
@@ -132,19 +166,29 @@ pub(super) fn soles(model: &Model, goals: &Goals) -> Vec<Vec<Vector3<f64>>> {
     soles
 }
 
-/// Height of the ground below the goals: the median of the lowest foot points while they stand.
-pub(super) fn ground(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64, loop_mode: LoopMode) -> f64 {
-    let lowest = |f: usize| soles[f].iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
-    let heights = |frames: &mut dyn Iterator<Item = usize>| {
-        let mut heights: Vec<f64> = frames.map(lowest).filter(|h| h.is_finite()).collect();
-        heights.sort_by(f64::total_cmp);
-        heights
+/// What the ground is found from.
+pub(super) fn ground_points(model: &Model, goals: &Goals) -> Points {
+    let soles = soles(model, goals);
+    let feet = limbs(model, goals).into_iter().filter(|l| l.is_foot);
+    let in_feet: Vec<usize> = feet.flat_map(|limb| limb.knobs).collect();
+    let others = |k: &usize| !in_feet.contains(k);
+    let others: Vec<usize> = (0..model.knobs.len()).filter(others).collect();
+    let mut pose = model.empty_pose();
+    let all = |(qpos, soles): (&Vec<f64>, &Vec<Vector3<f64>>)| {
+        model.evaluate(qpos, &mut pose);
+        let place = |k: &usize| {
+            let knob = &model.knobs[*k];
+            let at = pose.bodies[knob.body] * nalgebra::Point3::from(knob.center);
+            at.coords - Vector3::z() * knob.radius
+        };
+        soles
+            .iter()
+            .copied()
+            .chain(others.iter().map(place))
+            .collect()
     };
-    let all = heights(&mut (0..soles.len()));
-    let low = all.get(all.len() / 20).copied().unwrap_or(0.0);
-    let stands = contact::detect_above(soles, low, fps, leg, loop_mode);
-    let standing = heights(&mut (0..soles.len()).filter(|f| stands[*f]));
-    standing.get(standing.len() / 2).copied().unwrap_or(low)
+    let all = goals.guess.iter().zip(&soles).map(all).collect();
+    Points { soles, all }
 }
 
 /// The goals' timeline; a wrapping one goes on for a cycle on both sides, so that stances may pass over the seam.
@@ -153,6 +197,9 @@ struct Timeline {
     margin: usize,
     cycle: Option<Isometry3<f64>>,
 }
+
+/// A foot or hand, and whether the source's stands, by frame.
+pub(super) type Contacts = (Slot, Vec<bool>);
 
 impl Timeline {
     fn new(frames: usize, cycle: Option<&Cycle>) -> Timeline {
@@ -183,6 +230,20 @@ impl Timeline {
         let after = path[1..=self.margin].iter().map(|p| moved(&step, p));
         before.chain(path.iter().copied()).chain(after).collect()
     }
+
+    /// The same of something that is alike in every cycle.
+    fn repeat(&self, flags: &[bool]) -> Vec<bool> {
+        if self.cycle.is_none() {
+            return flags.to_vec();
+        }
+        let cycle = self.frames - 1;
+        let parts = [
+            &flags[cycle - self.margin..cycle],
+            flags,
+            &flags[1..=self.margin],
+        ];
+        parts.concat()
+    }
 }
 
 /// A knob that stands in a frame: where the goals have it, and where it should be.
@@ -199,6 +260,7 @@ pub(super) struct Held {
 pub(super) fn plant(
     model: &Model,
     goals: &mut Goals,
+    contacts: &[Contacts],
     fps: f64,
     leg: f64,
     cycle: Option<&Cycle>,
@@ -207,18 +269,11 @@ pub(super) fn plant(
     let timeline = Timeline::new(goals.frames(), cycle);
     let mut anchors = vec![Vec::new(); goals.frames()];
     for (limb, paths) in limbs.iter().zip(paths(model, goals, &limbs)) {
-        let mut held: Vec<Vec<Held>> = vec![Vec::new(); goals.frames() + 2 * timeline.margin];
-        for (&knob, path) in limb.knobs.iter().zip(&paths) {
-            let path = timeline.extend(path);
-            for (f, at, weight) in stances(&path, model.knobs[knob].radius, fps, leg) {
-                held[f].push(Held {
-                    knob,
-                    from: path[f],
-                    at,
-                    weight,
-                });
-            }
-        }
+        let paths: Vec<Vec<Vector3<f64>>> = paths.iter().map(|p| timeline.extend(p)).collect();
+        let slot = goals.keys[limb.key].slot;
+        let touches = contacts.iter().find(|contact| contact.0 == slot);
+        let touches = touches.map(|(_, flags)| timeline.repeat(flags));
+        let held = held(model, limb, &paths, touches.as_deref(), fps, leg);
         let own: Vec<Vector3<f64>> = goals.points.iter().map(|points| points[limb.key]).collect();
         let moves = footing::moves(&held, &timeline.extend(&own), fps);
         let own = held.iter().zip(&moves).skip(timeline.margin);
@@ -235,34 +290,122 @@ pub(super) fn plant(
     anchors
 }
 
-/// Frame, place and weight wherever a knob's path stands on the ground.
+/// The knobs of a limb that stand, by frame. Feet stand where they rest low; hands where the source's do, which holds
+/// its wrist higher.
+fn held(
+    model: &Model,
+    limb: &Limb,
+    paths: &[Vec<Vector3<f64>>],
+    touches: Option<&[bool]>,
+    fps: f64,
+    leg: f64,
+) -> Vec<Vec<Held>> {
+    let frames = paths.first().map_or(0, Vec::len);
+    let bottom = |k: usize, f: usize| paths[k][f].z - model.knobs[limb.knobs[k]].radius;
+    let mut held: Vec<Vec<Held>> = vec![Vec::new(); frames];
+    for (k, (&knob, path)) in limb.knobs.iter().zip(paths).enumerate() {
+        let radius = model.knobs[knob].radius;
+        let weights: Vec<f64> = if limb.is_foot {
+            let sole = |p: &Vector3<f64>| vec![p - Vector3::z() * radius];
+            let soles: Vec<Vec<Vector3<f64>>> = path.iter().map(sole).collect();
+            let stands = contact::detect_above(&soles, 0.0, fps, leg, LoopMode::Clamp);
+            let weight = |f: usize| ramp(HELD, bottom(k, f) / leg);
+            (0..frames)
+                .map(|f| if stands[f] { weight(f) } else { f64::NAN })
+                .collect()
+        } else {
+            let lowest = |f: usize| (0..paths.len()).all(|o| bottom(k, f) < bottom(o, f) + PALM);
+            let stands = |f: usize| touches.is_some_and(|t| t[f]) && lowest(f);
+            let weight = |f: usize| ramp(HAND_HELD, bottom(k, f) / leg);
+            (0..frames)
+                .map(|f| if stands(f) { weight(f) } else { f64::NAN })
+                .collect()
+        };
+        for (f, at, weight) in stances(path, &weights, radius, fps, leg) {
+            held[f].push(Held {
+                knob,
+                from: path[f],
+                at,
+                weight,
+            });
+        }
+    }
+    held
+}
+
+/// 1 up to the first height, 0 from the second on.
+fn ramp([full, none]: [f64; 2], height: f64) -> f64 {
+    ((none - height) / (none - full)).clamp(0.0, 1.0)
+}
+
+/// Frame, place and weight wherever a knob stands; its weight is no number where it doesn't.
 fn stances(
     path: &[Vector3<f64>],
+    weights: &[f64],
     radius: f64,
     fps: f64,
     leg: f64,
 ) -> Vec<(usize, Vector3<f64>, f64)> {
-    let sole: Vec<Vec<Vector3<f64>>> = path
-        .iter()
-        .map(|p| vec![p - Vector3::z() * radius])
-        .collect();
-    let stands = contact::detect_above(&sole, 0.0, fps, leg, LoopMode::Clamp);
-    let weight = |f: usize| {
-        let height = sole[f][0].z / leg;
-        ((HELD[1] - height) / (HELD[1] - HELD[0])).clamp(0.0, 1.0)
-    };
     let mut found = Vec::new();
     let mut f = 0;
     while f < path.len() {
-        let end = (f..path.len()).find(|g| !stands[*g]).unwrap_or(path.len());
-        let total: f64 = (f..end).map(weight).sum();
-        if total > 0.0 {
-            let sum: Vector3<f64> = (f..end).map(|g| path[g] * weight(g)).sum();
-            let mean = sum / total;
-            let at = Vector3::new(mean.x, mean.y, radius);
-            found.extend((f..end).map(|g| (g, at, weight(g))).filter(|w| w.2 > 0.0));
+        let ends = |g: &usize| weights[*g].is_nan();
+        let end = (f..path.len()).find(ends).unwrap_or(path.len());
+        let stance = Stance {
+            path: &path[f..end],
+            weights: &weights[f..end],
+            fps,
+            leg,
+        };
+        let rest = stance.rest();
+        for (i, weight) in stance.weights.iter().enumerate() {
+            let place = stance.place(i, &rest);
+            let at = Vector3::new(place.x, place.y, radius);
+            if *weight > 0.0 {
+                found.push((f + i, at, *weight));
+            }
         }
         f = end + 1;
     }
     found
+}
+
+/// A knob from where it begins to stand to where it ends.
+struct Stance<'a> {
+    path: &'a [Vector3<f64>],
+    weights: &'a [f64],
+    fps: f64,
+    leg: f64,
+}
+
+impl Stance<'_> {
+    /// Leg lengths per second.
+    fn speed(&self, i: usize) -> f64 {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(self.path.len() - 1));
+        let shift = (self.path[b] - self.path[a]).xy().norm();
+        shift * self.fps / ((b - a).max(1) as f64 * self.leg)
+    }
+
+    /// Where the knob rests: where it does so last and slowest. What was before has no say, so that a stance is the
+    /// same in a clip that begins in its midst.
+    fn rest(&self) -> Vector3<f64> {
+        let enough = LAST * self.fps;
+        let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+        for j in (0..self.path.len()).rev() {
+            let slow = (-(self.speed(j) / SLOW).powi(2)).exp() + 1e-9;
+            let says = slow * self.weights[j].max(1e-3);
+            sum += self.path[j] * says;
+            total += says;
+            if total > enough {
+                break;
+            }
+        }
+        sum / total
+    }
+
+    /// Where the knob should be: at its rest, as long as it is near; where the source has it, once that slides.
+    fn place(&self, i: usize, rest: &Vector3<f64>) -> Vector3<f64> {
+        let away = (rest - self.path[i]).xy().norm() / self.leg;
+        self.path[i].lerp(rest, ramp(SLIDES, away))
+    }
 }

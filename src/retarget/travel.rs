@@ -3,11 +3,13 @@
 use super::goals::Goals;
 use super::model::Model;
 use super::stance::soles;
-use crate::clip::{Problem, Severity};
+use crate::clip::{LoopMode, Problem, Severity};
 use nalgebra::Vector3;
 
 /// A root that moves no further in a cycle than this stays on the spot, leg lengths.
 const ON_THE_SPOT: f64 = 0.1;
+/// One that is further away from its start on the way travels, leg lengths.
+const STRAYS: f64 = 0.25;
 /// A foot is down when its lowest point is this near to the clip's lowest, leg lengths.
 const DOWN: f64 = 0.04;
 /// Slower sliding is taken for sliding, leg lengths per second.
@@ -17,24 +19,48 @@ const AGREES: f64 = 0.5;
 /// … and this part of the frames in which a foot is down has to.
 const MAJORITY: f64 = 0.6;
 
-/// Adds steady travel to goals on the spot whose feet slide steadily while they are down; says so.
-pub(super) fn restore(goals: &mut Goals, model: &Model, fps: f64, leg: f64) -> Option<Problem> {
+/// The steady travel that a clip on the spot lacks: its feet slide steadily while they are down.
+pub(super) fn missing(
+    goals: &Goals,
+    model: &Model,
+    fps: f64,
+    leg: f64,
+    loop_mode: LoopMode,
+) -> Option<Vector3<f64>> {
     let last = goals.frames().checked_sub(1)?;
-    if (goals.root(last) - goals.root(0)).xy().norm() > ON_THE_SPOT * leg {
+    let away = |f: usize| (goals.root(f) - goals.root(0)).xy().norm();
+    let strays = (0..=last).any(|f| away(f) > STRAYS * leg);
+    if strays || away(last) > ON_THE_SPOT * leg {
         return None;
     }
-    let velocity = -sliding(&soles(model, goals), fps, leg)?;
-    for f in 0..goals.frames() {
-        goals.shift_frame(f, &(velocity * (f as f64 / fps)));
+    let soles = soles(model, goals);
+    if loop_mode == LoopMode::Clamp && !alternate(&soles) {
+        return None;
     }
-    Some(Problem {
+    Some(-sliding(&soles, fps, leg)?)
+}
+
+pub(super) fn problem(velocity: &Vector3<f64>) -> Problem {
+    Problem {
         id: "travel-restored".to_owned(),
         severity: Severity::Note,
         message: format!(
             "the clip moves on the spot with sliding feet; travel of {:.2} m/s was added so that they stand",
             velocity.norm()
         ),
-    })
+    }
+}
+
+/// Whether now the one and now the other half of the sole points (one foot's each) is lower: a gait, and no slide.
+fn alternate(soles: &[Vec<Vector3<f64>>]) -> bool {
+    let lowest = |points: &[Vector3<f64>]| points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let left = |frame: &Vec<Vector3<f64>>| {
+        let (left, right) = frame.split_at(frame.len() / 2);
+        lowest(left) < lowest(right)
+    };
+    let count = soles.iter().filter(|frame| left(frame)).count();
+    let least = soles.len() / 5;
+    (least..=soles.len() - least).contains(&count) && least > 0
 }
 
 /// Velocity at which feet slide while they are down; `None` if they don't, or in no steady way.

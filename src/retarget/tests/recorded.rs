@@ -3,6 +3,8 @@
 use super::super::*;
 use super::{clip, coordinate, data, humanoid, on_humanoid};
 use crate::humanoid::Slot;
+use crate::import;
+use nalgebra::Isometry3;
 
 /// Whether a motion has human knees and elbows, its left on the left, and walks forward on alternating feet.
 fn assert_walks(motion: &Motion, skeleton: &Skeleton) {
@@ -37,13 +39,13 @@ fn assert_walks(motion: &Motion, skeleton: &Skeleton) {
     assert!(motion.cycle.translation.x > 1.0 && motion.cycle.translation.y.abs() < 0.1);
 }
 
-fn assert_good(report: &Report, keypoints: f64) {
+fn assert_good(report: &Report, keypoints: f64, skate: f64) {
     assert!(
         report.keypoint_error_m.mean < keypoints,
         "{:?}",
         report.keypoint_error_m
     );
-    assert!(report.foot_skate_m_s < 0.02, "{}", report.foot_skate_m_s);
+    assert!(report.foot_skate_m_s < skate, "{}", report.foot_skate_m_s);
     assert!(
         report.penetration_m.max < 0.01,
         "{:?}",
@@ -55,13 +57,14 @@ fn assert_good(report: &Report, keypoints: f64) {
 
 #[test]
 fn walks_of_several_rigs_walk() {
-    let walk = clip("deepmimic/humanoid3d_walk.txt", None).map(|c| (c, 0.01));
-    let xbot = clip("mixamo/Xbot.glb", Some("walk")).map(|c| (c, 0.03));
-    let soldier = clip("mixamo/Soldier.glb", Some("Walk")).map(|c| (c, 0.03));
+    let walk = clip("deepmimic/humanoid3d_walk.txt", None).map(|c| (c, 0.012, 0.02));
+    // These walk on the spot; how fast is a mean, so that their feet rest in few frames.
+    let xbot = clip("mixamo/Xbot.glb", Some("walk")).map(|c| (c, 0.03, 0.07));
+    let soldier = clip("mixamo/Soldier.glb", Some("Walk")).map(|c| (c, 0.03, 0.07));
     let skeleton = humanoid();
-    for (clip, keypoints) in [walk, xbot, soldier].into_iter().flatten() {
+    for (clip, keypoints, skate) in [walk, xbot, soldier].into_iter().flatten() {
         let done = on_humanoid(&clip);
-        assert_good(&done.report, keypoints);
+        assert_good(&done.report, keypoints, skate);
         assert_walks(&done.motion, &skeleton);
     }
 }
@@ -72,7 +75,7 @@ fn acrobatics_of_the_same_proportions_stay_near_their_source() {
         let Some(clip) = clip(&format!("deepmimic/humanoid3d_{file}.txt"), None) else {
             return;
         };
-        assert_good(&on_humanoid(&clip).report, 0.015);
+        assert_good(&on_humanoid(&clip).report, 0.025, 0.03);
     }
 }
 
@@ -86,5 +89,82 @@ fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
         return;
     };
     let done = retarget(&clip, &skeleton, &Options::default()).unwrap();
-    assert_good(&done.report, 0.01);
+    assert_good(&done.report, 0.012, 0.02);
+}
+
+/// In the midst of a cartwheel only hands are down: the feet are no ground to stand on.
+#[test]
+fn a_part_in_which_no_foot_comes_down_keeps_its_height() {
+    let options = import::Options {
+        trim: Some((1.25, 1.45)),
+        ..Default::default()
+    };
+    let Some(path) = data("deepmimic/humanoid3d_cartwheel.txt") else {
+        return;
+    };
+    let clip = import::load(path, &options).unwrap();
+    let done = on_humanoid(&clip);
+    // The character of these files has the humanoid's own proportions, and their ground is z = 0.
+    let scaled = |f: usize| clip.world(f)[0].translation.z;
+    for (f, bodies) in done.motion.bodies.iter().enumerate() {
+        assert!(
+            (bodies[0].translation.z - scaled(f)).abs() < 0.02,
+            "frame {f}"
+        );
+    }
+    assert!(done.report.penetration_m.max < 0.01);
+}
+
+/// Google's MuJoCo humanoid hangs on its torso; its hips go where the source's are all the same.
+#[test]
+fn a_skeleton_rooted_at_its_torso_has_its_hips_where_the_source_has_them() {
+    let Some(path) = data("characters/mujoco_humanoid.xml") else {
+        return;
+    };
+    let skeleton = Skeleton::load(&path).unwrap();
+    let Some(clip) = clip("deepmimic/humanoid3d_spinkick.txt", None) else {
+        return;
+    };
+    let map = humanoid::map(&clip.joints).unwrap();
+    let alignment = align::align(&clip, &map, &skeleton).unwrap();
+    let model = Model::new(&skeleton);
+    let goals = Goals::new(&clip, &map, &alignment, &model);
+    for (f, qpos) in goals.guess.iter().enumerate() {
+        let bodies = skeleton.forward(qpos);
+        let source = clip.world(f);
+        let mut apart = Vector3::zeros();
+        for slot in [Slot::LeftUpperLeg, Slot::RightUpperLeg] {
+            let joint = map.joint(slot).unwrap();
+            apart += bodies[skeleton.slots[&slot]].translation.vector;
+            apart -= source[joint].translation.vector * alignment.scale;
+        }
+        assert!(apart.norm() < 1e-9, "frame {f}: {}", apart.norm());
+    }
+}
+
+/// Hands that hang on a skeleton's shorter arms would turn a cartwheel in the air.
+#[test]
+fn hands_on_shorter_arms_reach_the_ground() {
+    let Some(clip) = clip("deepmimic/humanoid3d_cartwheel.txt", None) else {
+        return;
+    };
+    let ours = humanoid();
+    let shorter = ours.mjcf.replace("0 0 -0.274788", "0 0 -0.23");
+    assert_ne!(shorter, ours.mjcf, "the upper arms' length has changed");
+    let skeleton = Skeleton::from_mjcf("short", &shorter, Some(&ours.slots_json())).unwrap();
+    let done = retarget(&clip, &skeleton, &Options::default()).unwrap();
+    let hands =
+        |skeleton: &Skeleton| [Slot::LeftHand, Slot::RightHand].map(|slot| skeleton.slots[&slot]);
+    let touching = |done: &Retargeted, skeleton: &Skeleton| {
+        let low =
+            |poses: &&Vec<Isometry3<f64>>| skeleton.lowest_point_of(poses, &hands(skeleton)) < 0.01;
+        done.motion.bodies.iter().filter(low).count()
+    };
+    // The clip's character has arms as long as the humanoid's.
+    let (same, short) = (
+        touching(&on_humanoid(&clip), &ours),
+        touching(&done, &skeleton),
+    );
+    assert!(same * 10 > clip.frames.len(), "{same}");
+    assert!(short * 10 > same * 9, "{short} of {same}");
 }

@@ -1,0 +1,105 @@
+//! What the result is compared with: the source's joints, limb by limb in the skeleton's size.
+
+use super::source::Source;
+use crate::humanoid::Slot;
+use crate::skeleton::Skeleton;
+use nalgebra::Vector3;
+
+/// Limbs: where they spring from, bend and end.
+const LEGS: [[Slot; 3]; 2] = [
+    [Slot::LeftUpperLeg, Slot::LeftLowerLeg, Slot::LeftFoot],
+    [Slot::RightUpperLeg, Slot::RightLowerLeg, Slot::RightFoot],
+];
+const ARMS: [[Slot; 3]; 2] = [
+    [Slot::LeftUpperArm, Slot::LeftLowerArm, Slot::LeftHand],
+    [Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand],
+];
+
+/// Sizes of the skeleton relative to the scaled source.
+pub(super) struct Reference {
+    legs: f64,
+    arms: f64,
+    hips: f64,
+    shoulders: f64,
+    trunk: f64,
+}
+
+type Places<'a> = &'a dyn Fn(Slot) -> Option<Vector3<f64>>;
+
+fn middle(at: Places, slots: [Slot; 2]) -> Option<Vector3<f64>> {
+    Some((at(slots[0])? + at(slots[1])?) / 2.0)
+}
+
+fn hip_middle(at: Places) -> Option<Vector3<f64>> {
+    middle(at, [LEGS[0][0], LEGS[1][0]])
+}
+
+fn shoulder_middle(at: Places) -> Option<Vector3<f64>> {
+    middle(at, [ARMS[0][0], ARMS[1][0]])
+}
+
+fn width(at: Places, limbs: &[[Slot; 3]; 2]) -> Option<f64> {
+    Some((at(limbs[0][0])? - at(limbs[1][0])?).norm())
+}
+
+/// Length of a limb along its bones, mean of both sides.
+fn length(at: Places, limbs: &[[Slot; 3]; 2]) -> Option<f64> {
+    let bone = |a: Slot, b: Slot| Some((at(b)? - at(a)?).norm());
+    let limb = |[a, b, c]: [Slot; 3]| Some(bone(a, b)? + bone(b, c).unwrap_or(0.0));
+    Some((limb(limbs[0])? + limb(limbs[1])?) / 2.0)
+}
+
+fn trunk(at: Places) -> Option<f64> {
+    Some((shoulder_middle(at)? - hip_middle(at)?).norm())
+}
+
+impl Reference {
+    pub fn new(source: &Source, skeleton: &Skeleton) -> Reference {
+        let rest = skeleton.forward(&skeleton.rest_qpos());
+        let common =
+            |slot: Slot| skeleton.slots.contains_key(&slot) && source.rest.contains_key(&slot);
+        let ours = |slot: Slot| {
+            let body = skeleton.slots.get(&slot).filter(|_| common(slot))?;
+            Some(rest[*body].translation.vector)
+        };
+        let theirs = |slot: Slot| source.rest.get(&slot).filter(|_| common(slot)).copied();
+        let ratio = |of: &dyn Fn(Places) -> Option<f64>| match (of(&ours), of(&theirs)) {
+            (Some(ours), Some(theirs)) if theirs > 1e-6 => ours / theirs,
+            _ => 1.0,
+        };
+        Reference {
+            legs: ratio(&|at| length(at, &LEGS)),
+            arms: ratio(&|at| length(at, &ARMS)),
+            hips: ratio(&|at| width(at, &LEGS)),
+            shoulders: ratio(&|at| width(at, &ARMS)),
+            trunk: ratio(&trunk),
+        }
+    }
+
+    /// Hips, knees, ankles, shoulders, elbows and wrists at frame `f`, as far as the source has them.
+    pub fn places(&self, source: &Source, f: usize) -> Vec<(Slot, Vector3<f64>)> {
+        let at = |slot: Slot| source.at(slot, f);
+        let mut places = Vec::with_capacity(12);
+        let Some(hips) = hip_middle(&at) else {
+            return places;
+        };
+        let mut add =
+            |limbs: &[[Slot; 3]; 2], from: Vector3<f64>, to: Vector3<f64>, scales: [f64; 2]| {
+                for limb in limbs {
+                    let Some(root) = at(limb[0]) else { continue };
+                    let moved = to + (root - from) * scales[0];
+                    places.push((limb[0], moved));
+                    for slot in &limb[1..] {
+                        let joint = at(*slot).map(|p| moved + (p - root) * scales[1]);
+                        places.extend(joint.map(|p| (*slot, p)));
+                    }
+                }
+            };
+        add(&LEGS, hips, hips, [self.hips, self.legs]);
+        if let Some(shoulders) = shoulder_middle(&at) {
+            let to = hips + (shoulders - hips) * self.trunk;
+            add(&ARMS, shoulders, to, [self.shoulders, self.arms]);
+        }
+        places
+    }
+}
