@@ -12,8 +12,9 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) mod weight {
     /// Standing points, per metre.
     pub const STANCE: f64 = 12.0;
-    /// Points below the ground, per metre.
+    /// Points below the ground, per metre: at first, and where some are left too deep.
     pub const GROUND: f64 = 16.0;
+    pub const STIFF_GROUND: [f64; 2] = [60.0, 200.0];
     /// Coordinates outside of their limits, per radian: at first, and where some are left outside.
     pub const LIMIT: f64 = 3.0;
     pub const STIFF_LIMITS: [f64; 2] = [30.0, 300.0];
@@ -36,6 +37,8 @@ pub(super) struct Problem<'a> {
     pub fps: f64,
     /// Weight of a coordinate's distance outside of its limits, per radian.
     pub limit: f64,
+    /// Weight of a point's depth below the ground, per metre.
+    pub ground: f64,
 }
 
 /// Where one frame's derivatives go: gradient, and the lower triangle of a row-major matrix.
@@ -137,7 +140,7 @@ impl Problem<'_> {
                 columns
                     .iter_mut()
                     .for_each(|(_, lever)| *lever = Vector3::new(0.0, 0.0, lever.z));
-                cost += to.add(columns, &Vector3::new(0.0, 0.0, below), weight::GROUND);
+                cost += to.add(columns, &Vector3::new(0.0, 0.0, below), self.ground);
             }
         }
         cost

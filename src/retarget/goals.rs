@@ -272,10 +272,27 @@ impl<'a> Builder<'a> {
         }
         for leg in &LEGS {
             if let (Some(k), Some(p)) = (place(leg[2]), self.source_point(source, leg[2])) {
-                points[k] = p;
+                points[k] = p + self.hip_offset(leg[0], source, bodies);
             }
         }
         points
+    }
+
+    /// Where the skeleton's hip joint is beside the source's: feet stand as far apart as suits its hips.
+    fn hip_offset(
+        &self,
+        hip: Slot,
+        source: &[Isometry3<f64>],
+        bodies: &[Isometry3<f64>],
+    ) -> Vector3<f64> {
+        let ours = self.skeleton.slots.get(&hip);
+        match (ours, self.source_point(source, hip)) {
+            (Some(body), Some(theirs)) => {
+                let offset = bodies[*body].translation.vector - theirs;
+                Vector3::new(offset.x, offset.y, 0.0)
+            }
+            _ => Vector3::zeros(),
+        }
     }
 
     /// The skeleton's bone from one slot to the next in the source's direction.

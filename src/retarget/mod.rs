@@ -132,6 +132,7 @@ pub fn retarget(
         anchors: &anchors,
         fps: clip.fps,
         limit: cost::weight::LIMIT,
+        ground: cost::weight::GROUND,
     };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
     let contact_bodies = stance::contact_bodies(&model, &goals, &anchors);
@@ -213,6 +214,9 @@ fn put_on_ground(
     contacts
 }
 
+/// Depth below the ground from which on a frame is solved again, metres.
+const DEEPEST: f64 = 0.004;
+
 /// Fewest steps in a cycle; a clip with fewer ends where it ends.
 const SHORTEST_CYCLE: usize = 4;
 
@@ -230,11 +234,19 @@ fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
     let iterations = Solver::new(problem, cycle).run(&mut frames);
     // Clamping moves feet, so it should have nothing left to do.
     let skeleton = problem.model.skeleton;
-    let is_outside = |qpos: &[f64]| limits::violations(skeleton, qpos) > 0;
-    for limit in cost::weight::STIFF_LIMITS {
-        if frames.iter().any(|qpos| is_outside(qpos)) {
-            let stiff = Problem { limit, ..*problem };
-            Solver::new(&stiff, cycle).mend(&mut frames, is_outside);
+    let is_wrong = |qpos: &[f64]| {
+        limits::violations(skeleton, qpos) > 0
+            || skeleton.lowest_point(&skeleton.forward(qpos)) < -DEEPEST
+    };
+    let stiffer = cost::weight::STIFF_LIMITS.into_iter();
+    for (limit, ground) in stiffer.zip(cost::weight::STIFF_GROUND) {
+        if frames.iter().any(|qpos| is_wrong(qpos)) {
+            let stiff = Problem {
+                limit,
+                ground,
+                ..*problem
+            };
+            Solver::new(&stiff, cycle).mend(&mut frames, is_wrong);
         }
     }
     for qpos in &mut frames {

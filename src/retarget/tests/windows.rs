@@ -57,6 +57,7 @@ fn windows_give_what_one_solution_over_all_frames_gives() {
         anchors: &anchors,
         fps: 30.0,
         limit: cost::weight::LIMIT,
+        ground: cost::weight::GROUND,
     };
     let ahead = Cycle {
         translation: Vector3::x() * TRAVEL * FRAMES as f64,
@@ -90,6 +91,7 @@ fn windows_cover_every_frame_and_are_bounded() {
         anchors: &[],
         fps: 120.0,
         limit: cost::weight::LIMIT,
+        ground: cost::weight::GROUND,
     };
     let still = Cycle::NONE;
     for total in [0, 1, 5, 2_000, 2_400, 3_600 * 120] {

@@ -1,0 +1,290 @@
+"""Measures retargeted motions against their clips with MuJoCo's kinematics; shares no code with the retargeter.
+
+usage: python mujoco_retarget.py [--json] SKELETON.xml CLIP.clip MOTION.motion [CLIP MOTION ...]
+
+For every pair:
+- key points: median distance of shoulders, elbows, wrists, hips, knees and ankles from where the source's bones put
+  them, each bone in the skeleton's length, from the middle of the hips on; of that middle from the source's path,
+  scaled by the legs; cm
+- skate: mean horizontal speed of the slowest sole point that is on the ground, while the source's ankle or toes stand
+  still there; cm/s
+- penetration: deepest point of any shape below z = 0; cm
+- limits: coordinates more than 1e-6 outside of their range
+- jumps: the greatest step of a key point from a frame to the next beyond the source's own; cm
+
+Prints a line for each and a summary. Exits 1 when, over all, the median of the key points exceeds 3 cm, mean skate
+2 cm/s, any penetration 1 cm, or any limit is violated. Needs the packages mujoco, numpy and safetensors.
+"""
+
+import json
+import pathlib
+import sys
+
+import mujoco
+import numpy as np
+from safetensors import safe_open
+
+LIMBS = [
+    [f"{side}-{part}" for part in parts]
+    for side in ("left", "right")
+    for parts in (("upper-leg", "lower-leg", "foot"), ("upper-arm", "lower-arm", "hand"))
+]
+# The source's foot stands still: slower than this, and this near to the lowest that it comes; metres of the skeleton.
+STILL_M_S, LOW_M = 0.05, 0.03
+# Sole points this near to the lowest one are on the ground, if that is this near to z = 0.
+SOLE_M, GROUND_M = 0.01, 0.03
+
+
+def load(path):
+    with safe_open(path, framework="numpy") as file:
+        return json.loads(file.metadata()["mimic"]), {k: file.get_tensor(k) for k in file.keys()}
+
+
+def rotate(q, v):
+    """Rotates vectors by quaternions w, x, y, z."""
+    u, w = q[..., 1:], q[..., :1]
+    return v + 2 * np.cross(u, np.cross(u, v) + w * v)
+
+
+def multiply(a, b):
+    ua, wa, ub, wb = a[..., 1:], a[..., :1], b[..., 1:], b[..., :1]
+    w = wa * wb - (ua * ub).sum(-1, keepdims=True)
+    return np.concatenate([w, wa * ub + wb * ua + np.cross(ua, ub)], -1)
+
+
+def source_joints(header, t):
+    """World positions `[frames, joints, 3]`, and those of the rest pose."""
+    parents = t["parent"]
+
+    def forward(translation, rotation):
+        p, q = np.array(translation, float), np.array(rotation, float)
+        for j, parent in enumerate(parents):
+            if parent >= 0:
+                p[:, j] = p[:, parent] + rotate(q[:, parent], p[:, j])
+                q[:, j] = multiply(q[:, parent], q[:, j])
+        return p
+
+    moving = forward(t["local_translation"], t["local_rotation"])
+    return moving, forward(t["rest_translation"][None], t["rest_rotation"][None])[0]
+
+
+class Rig:
+    """A skeleton in MuJoCo."""
+
+    def __init__(self, path):
+        self.model = mujoco.MjModel.from_xml_path(str(path))
+        self.data = mujoco.MjData(self.model)
+        slots = json.loads(path.with_suffix(".json").read_text())["slots"]
+        self.body = {s: mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, n) for s, n in slots.items()}
+        self.shapes = [g for g in range(self.model.ngeom) if self.model.geom_bodyid[g] > 0]
+
+    def pose(self, qpos):
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.data)
+        return self.data.xpos.copy()
+
+    def corners(self):
+        """For every shape: its body, and the points of it that can be lowest, in its own frame, with their radius."""
+        out = []
+        for g in self.shapes:
+            size, kind = self.model.geom_size[g], self.model.geom_type[g]
+            if kind == mujoco.mjtGeom.mjGEOM_BOX:
+                signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+                out.append((g, signs * size, 0.0))
+            elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+                out.append((g, np.array([[0, 0, size[1]], [0, 0, -size[1]]]), size[0]))
+            else:
+                out.append((g, np.zeros((1, 3)), size[0]))
+        return out
+
+    def surface(self, corners):
+        """World positions of those points in the pose set last."""
+        at = []
+        for g, points, _ in corners:
+            turn = self.data.geom_xmat[g].reshape(3, 3)
+            at.append(self.data.geom_xpos[g] + points @ turn.T)
+        return at
+
+    def outside(self, qpos):
+        count = 0
+        m = self.model
+        for a in range(m.nu):
+            j = m.actuator_trnid[a, 0]
+            at = m.jnt_qposadr[j]
+            if m.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE:
+                if m.jnt_limited[j]:
+                    low, high = m.jnt_range[j]
+                    count += not low - 1e-6 <= qpos[at] <= high + 1e-6
+                continue
+            if a and m.actuator_trnid[a - 1, 0] == j:
+                continue  # a ball joint's three drives at once
+            drives = [b for b in range(m.nu) if m.actuator_trnid[b, 0] == j]
+            turn = np.zeros(3)
+            mujoco.mju_quat2Vel(turn, qpos[at : at + 4], 1.0)
+            angle = np.linalg.norm(turn)
+            either = [turn] if angle < 1e-9 else [turn, turn * (1 - 2 * np.pi / angle)]
+            off = []
+            for v in either:
+                x = m.actuator_gear[drives][:, :3] @ v
+                low, high = m.actuator_ctrlrange[drives].T
+                off.append(int(((x < low - 1e-6) | (x > high + 1e-6)).sum()))
+            count += min(off)
+        return count
+
+
+def middle(points, left, right):
+    return (points[left] + points[right]) / 2
+
+
+def targets(rig, source, rest, zero):
+    """Where the source's bones put the key points, by slot; `zero` is the skeleton's rest pose."""
+    ours = {s: zero[b] for s, b in rig.body.items()}
+    hips = middle(source, "left-upper-leg", "right-upper-leg")
+    out = {}
+
+    def spread(anchor, center, limbs):
+        slots = [limb[0] for limb in limbs]
+        scale = np.linalg.norm(ours[slots[0]] - ours[slots[1]]) / np.linalg.norm(rest[slots[0]] - rest[slots[1]])
+        for limb in limbs:
+            out[limb[0]] = anchor + (source[limb[0]] - center) * scale
+            for a, b in zip(limb, limb[1:]):
+                if b not in source or b not in ours:
+                    break
+                bone = source[b] - source[a]
+                length = np.linalg.norm(ours[b] - ours[a])
+                out[b] = out[a] + bone * length / np.maximum(np.linalg.norm(bone, axis=-1, keepdims=True), 1e-9)
+
+    spread(np.zeros(3), hips, [LIMBS[0], LIMBS[2]])
+    shoulders = middle(source, "left-upper-arm", "right-upper-arm")
+    trunk = lambda at: np.linalg.norm(
+        middle(at, "left-upper-arm", "right-upper-arm") - middle(at, "left-upper-leg", "right-upper-leg")
+    )
+    spread((shoulders - hips) * trunk(ours) / trunk(rest), shoulders, [LIMBS[1], LIMBS[3]])
+    return out
+
+
+def leg(at):
+    return np.mean([sum(np.linalg.norm(at[b] - at[a]) for a, b in zip(l, l[1:])) for l in (LIMBS[0], LIMBS[2])])
+
+
+def still_feet(source, scale, fps):
+    """By side: frames from which to the next the ankle or the toes stand still near their lowest."""
+    out = {}
+    for side in ("left", "right"):
+        stands = False
+        for part in ("foot", "toes"):
+            path = source.get(f"{side}-{part}")
+            if path is None:
+                continue
+            path = path * scale
+            step = np.linalg.norm(np.diff(path, axis=0), axis=1) * fps
+            low = path[:-1, 2] < path[:, 2].min() + LOW_M
+            stands = stands | ((step < STILL_M_S) & low)
+        out[side] = stands
+    return out
+
+
+def measure(rig, clip, motion):
+    header, t = load(clip)
+    moved, m = load(motion)
+    joints = {name: j for j, name in enumerate(header["joints"])}
+    world, rest = source_joints(header, t)
+    slots = {e["slot"]: joints[e["joint"]] for e in moved["report"]["map"]}
+    source = {s: world[:, j] for s, j in slots.items()}
+    rest = {s: rest[j] for s, j in slots.items()}
+    zero = rig.pose(np.r_[0, 0, 0, rig.model.qpos0[3:]])
+    ours = {s: zero[b] for s, b in rig.body.items()}
+    scale = leg(ours) / leg(rest)
+    qpos, fps = m["qpos"], moved["fps"]
+    corners = rig.corners()
+    bodies, surfaces, depth, outside = [], [], 0.0, 0
+    for q in qpos:
+        bodies.append(rig.pose(q))
+        at = rig.surface(corners)
+        surfaces.append(at)
+        depth = max(depth, max(c[2] - p[:, 2].min() for c, p in zip(corners, at)))
+        outside += rig.outside(q)
+    bodies = np.array(bodies)
+    count = min(len(qpos), len(world))
+    at = {s: bodies[:count, b] for s, b in rig.body.items()}
+    source = {s: p[:count] for s, p in source.items()}
+    hips = middle(at, "left-upper-leg", "right-upper-leg")
+    wanted = targets(rig, source, rest, zero)
+    errors = [np.linalg.norm(at[s] - hips - p, axis=1) for s, p in wanted.items()]
+    path = middle(source, "left-upper-leg", "right-upper-leg") * scale
+    away = hips - path
+    restored = any(p["id"] == "travel-restored" for p in moved["report"]["problems"])
+    if restored:
+        time = np.arange(count)[:, None] / max(count - 1, 1)
+        away = away - time * (away[-1] - away[0])
+    errors.append(np.linalg.norm(away - np.median(away, axis=0), axis=1))
+    step = lambda p: np.linalg.norm(np.diff(p, axis=0), axis=1)
+    jumps = [step(at[s] - hips) - step(p) for s, p in wanted.items()]
+    speeds = []
+    for side, still in still_feet(source, scale, fps).items():
+        foot = rig.body[f"{side}-foot"]
+        mine = [i for i, c in enumerate(corners) if under(rig.model, rig.model.geom_bodyid[c[0]], foot)]
+        for f in np.flatnonzero(still[: count - 1]) if not restored else []:
+            now = np.concatenate([surfaces[f][i] - [0, 0, corners[i][2]] for i in mine])
+            then = np.concatenate([surfaces[f + 1][i] - [0, 0, corners[i][2]] for i in mine])
+            on = (now[:, 2] < now[:, 2].min() + SOLE_M) & (now[:, 2] < GROUND_M)
+            if on.any():
+                speeds.append(np.linalg.norm((then - now)[on][:, :2], axis=1).min() * fps)
+    return {
+        "keypoints_cm": np.concatenate(errors) * 100,
+        "skate_cm_s": np.array(speeds) * 100,
+        "penetration_cm": depth * 100,
+        "outside": outside,
+        "jump_cm": max((j.max(initial=0.0) for j in jumps), default=0.0) * 100,
+    }
+
+
+def under(model, body, top):
+    while body > 0:
+        if body == top:
+            return True
+        body = model.body_parentid[body]
+    return False
+
+
+def main():
+    arguments = sys.argv[1:]
+    as_json = "--json" in arguments
+    skeleton, *files = [a for a in arguments if a != "--json"]
+    rig = Rig(pathlib.Path(skeleton))
+    keypoints, skates, ok = [], [], True
+    rows = []
+    for clip, motion in zip(files[::2], files[1::2]):
+        r = measure(rig, clip, motion)
+        keypoints.append(r["keypoints_cm"])
+        skates.append(r["skate_cm_s"])
+        ok &= r["penetration_cm"] <= 1.0 and r["outside"] == 0
+        row = {
+            "motion": pathlib.Path(motion).stem,
+            "keypoints_median_cm": float(np.median(r["keypoints_cm"])),
+            "keypoints_p99_cm": float(np.percentile(r["keypoints_cm"], 99)),
+            "skate_cm_s": float(r["skate_cm_s"].mean()) if len(r["skate_cm_s"]) else 0.0,
+            "still_frames": len(r["skate_cm_s"]),
+            "penetration_cm": float(r["penetration_cm"]),
+            "outside": r["outside"],
+            "jump_cm": float(r["jump_cm"]),
+        }
+        rows.append(row)
+        if not as_json:
+            numbers = "  ".join(f"{k} {v:.2f}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items() if k != "motion")
+            print(f"{row['motion']:44} {numbers}", flush=True)
+    every, skate = np.concatenate(keypoints), np.concatenate(skates)
+    total = {
+        "motions": len(rows),
+        "keypoints_median_cm": float(np.median(every)),
+        "skate_mean_cm_s": float(skate.mean()) if len(skate) else 0.0,
+        "penetration_max_cm": max(r["penetration_cm"] for r in rows),
+        "outside": sum(r["outside"] for r in rows),
+    }
+    ok &= total["keypoints_median_cm"] <= 3.0 and total["skate_mean_cm_s"] <= 2.0
+    print(json.dumps({"rows": rows, "total": total}) if as_json else json.dumps(total))
+    sys.exit(0 if ok else 1)
+
+
+if __name__ == "__main__":
+    main()
