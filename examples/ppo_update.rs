@@ -85,11 +85,7 @@ impl<T: Scalar> Experience<T> {
         let mut workspace = ActWorkspace::default();
         let acted = policy.act(learner.parameters(), &observations, &noise, &mut workspace)?;
         let mut judging = ActWorkspace::default();
-        let values = policy.values(
-            learner.parameters(),
-            &observations,
-            &mut judging,
-        )?;
+        let values = policy.values(learner.parameters(), &observations, &mut judging)?;
         // As if an older policy had acted: ratios fall on both sides of the clipping range.
         let shift = random::<T>(SAMPLES, rng);
         let log_probs = acted.log_probs.iter().zip(shift);

@@ -13,6 +13,7 @@ mod error;
 mod facing;
 mod fbx;
 mod gltf;
+mod lead;
 mod measure;
 mod rigid;
 mod scene;
@@ -54,7 +55,8 @@ pub struct Options {
     pub take: Option<String>,
     /// Frames per second to sample at; the take's own if left out.
     pub fps: Option<f64>,
-    /// Part of the take to keep, in seconds from its start.
+    /// Part of the take to keep, in seconds from its start. If left out, all of it but a first frame from which the
+    /// motion doesn't go on.
     pub trim: Option<(f64, f64)>,
     /// Whether it loops; found out if left out.
     pub loop_mode: Option<LoopMode>,
@@ -250,9 +252,13 @@ fn clip(
     let fps = options.fps.unwrap_or(about.fps);
     let most = most_frames(scene, about, rig.joints.len(), most);
     let grid = grid(scene, file, about, end - start, fps, most)?;
-    let world = rig.frames(take, start, &grid)?;
+    let mut world = rig.frames(take, start, &grid)?;
     let mut problems = scene.problems().to_vec();
     problems.extend_from_slice(&about.problems);
+    if options.trim.is_none() && lead::is_apart(&world) {
+        world.remove(0);
+        problems.push(lead::problem());
+    }
     problems.extend(sampling_problems(&grid, fps, &world));
     let wraps = match options.loop_mode {
         Some(mode) => mode == LoopMode::Wrap,

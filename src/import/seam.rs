@@ -19,7 +19,7 @@ const JUMP_OF_SPEED: f64 = 0.25;
 /// Fewest frames in which a cycle can be seen.
 const FEWEST: usize = 5;
 
-type Places = Vec<Vector3<f64>>;
+pub(super) type Places = Vec<Vector3<f64>>;
 
 /// Whether the clip with these world transforms wraps: its last frame is its first, moved over the ground.
 ///
@@ -84,7 +84,7 @@ fn runs_on(frames: &[Places], jump: &[Vector3<f64>]) -> bool {
 }
 
 /// Places of the joints that move at all: a file's still armature nodes don't travel with the character.
-fn moving_places(world: &[Vec<Isometry3<f64>>]) -> Vec<Places> {
+pub(super) fn moving_places(world: &[Vec<Isometry3<f64>>]) -> Vec<Places> {
     let Some(first) = world.first() else {
         return Vec::new();
     };
@@ -106,7 +106,7 @@ fn moving_places(world: &[Vec<Isometry3<f64>>]) -> Vec<Places> {
 }
 
 /// Longest side of the box around the joints, metres.
-fn extent(frame: &[Isometry3<f64>]) -> f64 {
+pub(super) fn extent(frame: &[Isometry3<f64>]) -> f64 {
     let side = |axis: usize| {
         let along = frame.iter().map(|joint| joint.translation.vector[axis]);
         let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -132,11 +132,11 @@ fn pose_range(frames: &[Places]) -> f64 {
     frames.iter().map(away).fold(0.0, f64::max)
 }
 
-fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
+pub(super) fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
     a.iter().zip(b).map(|(a, b)| b - a).collect()
 }
 
-fn rms(vectors: &[Vector3<f64>]) -> f64 {
+pub(super) fn rms(vectors: &[Vector3<f64>]) -> f64 {
     let square: f64 = vectors.iter().map(Vector3::norm_squared).sum();
     (square / vectors.len().max(1) as f64).sqrt()
 }

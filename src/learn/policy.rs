@@ -248,12 +248,7 @@ impl Policy {
         workspace.means.extend_from_slice(means);
     }
 
-    fn run_critic<T: Scalar>(
-        &self,
-        parameters: &[T],
-        x: &[T],
-        workspace: &mut ActWorkspace<T>,
-    ) {
+    fn run_critic<T: Scalar>(&self, parameters: &[T], x: &[T], workspace: &mut ActWorkspace<T>) {
         let values = self.critic.forward(
             &parameters[self.critic_range()],
             x,

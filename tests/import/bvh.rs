@@ -147,7 +147,11 @@ fn every_joint_of_every_frame_is_in_its_place() {
     ] {
         let Some(path) = data(name) else { return };
         let text = std::fs::read_to_string(&path).expect("the file opens");
-        let clip = import::load(&path, &Options::default()).expect("it imports");
+        let options = Options {
+            trim: Some((0.0, f64::INFINITY)),
+            ..Options::default()
+        };
+        let clip = import::load(&path, &options).expect("it imports");
         agrees(&clip, &evaluate(&text), up, unit, name);
     }
 }
@@ -165,6 +169,31 @@ fn rates_are_those_that_the_frame_times_stand_for() {
         let clip = import::load(&path, &Options::default()).expect("it imports");
         assert!((clip.fps - fps).abs() < 1e-9, "{name}: {}", clip.fps);
     }
+}
+
+/// The recording of subject 1 has as many frames in its own format, which has no pose before them.
+#[test]
+fn a_pose_before_the_motion_is_left_out_unless_it_is_asked_for() {
+    let Some(path) = data("cmu/01_01.bvh") else {
+        return;
+    };
+    let Some(recording) = data("cmu/01_01.amc") else {
+        return;
+    };
+    let text = std::fs::read_to_string(recording).expect("the file opens");
+    let is_number = |line: &&str| line.trim().parse::<u32>().is_ok();
+    let recorded = text.lines().filter(is_number).count();
+    let frames = |trim| {
+        let options = Options {
+            trim,
+            ..Options::default()
+        };
+        let clip = import::load(&path, &options).expect("it imports");
+        let told = clip.problems.iter().any(|p| p.id == "first-frame-left-out");
+        (clip.frames.len(), told)
+    };
+    assert_eq!(frames(None), (recorded, true));
+    assert_eq!(frames(Some((0.0, f64::INFINITY))), (recorded + 1, false));
 }
 
 /// Two joints, as few programs would write them: no end site, places on a joint, an exponent, a decimal comma, an

@@ -291,7 +291,7 @@ fn the_gradient_is_the_derivative_of_the_cost() {
             anchors: &anchors,
             fps: 30.0,
             limit: cost::weight::LIMIT,
-        ground: cost::weight::GROUND,
+            ground: cost::weight::GROUND,
         };
         for (cycle, start, count) in [
             (None, 0, 6),
