@@ -125,7 +125,7 @@ impl Problem<'_> {
             let knob = &self.model.knobs[anchor.knob];
             let at = (pose.bodies[knob.body] * nalgebra::Point3::from(knob.center)).coords;
             self.levers(knob.body, pose, &at, columns);
-            cost += to.add(columns, &(at - anchor.at), weight::STANCE * anchor.weight);
+            cost += to.add(columns, &(at - anchor.at), weight::STANCE * anchor.hold);
         }
         cost
     }

@@ -17,8 +17,10 @@ pub(super) struct Anchor {
     pub knob: usize,
     /// Where the knob's centre should be, world, metres.
     pub at: Vector3<f64>,
-    /// From 0 to 1.
+    /// How near the ground it stands, from 0 to 1.
     pub weight: f64,
+    /// How firmly it is held there, from 0 to 1: a stance takes hold and lets go in some frames.
+    pub hold: f64,
 }
 
 /// A foot or hand: its key among the goals, and the knobs that it carries.
@@ -42,6 +44,8 @@ const PALM: f64 = 0.02;
 const SLOW: f64 = 0.08;
 /// Distances from its place at which a standing point begins to go with the source, and does so wholly, leg lengths.
 const SLIDES: [f64; 2] = [0.08, 0.14];
+/// Time in which a stance takes hold of a point, and in which it lets go, s.
+const TAKES_HOLD: f64 = 0.08;
 /// Time at rest from whose mean the place of a stance follows, s.
 const LAST: f64 = 0.5;
 
@@ -253,6 +257,7 @@ pub(super) struct Held {
     pub from: Vector3<f64>,
     pub at: Vector3<f64>,
     pub weight: f64,
+    pub hold: f64,
 }
 
 /// Finds what stands on the ground, which is at z = 0, and moves the goals of feet and hands along with it.
@@ -282,6 +287,7 @@ pub(super) fn plant(
                 knob: h.knob,
                 at: h.at,
                 weight: h.weight,
+                hold: h.hold,
             };
             frame.extend(held.iter().map(anchor));
             footing::apply(goals, f, limb.key, by);
@@ -321,12 +327,13 @@ fn held(
                 .map(|f| if stands(f) { weight(f) } else { f64::NAN })
                 .collect()
         };
-        for (f, at, weight) in stances(path, &weights, radius, fps, leg) {
+        for (f, at, weight, hold) in stances(path, &weights, radius, fps, leg) {
             held[f].push(Held {
                 knob,
                 from: path[f],
                 at,
                 weight,
+                hold,
             });
         }
     }
@@ -338,14 +345,14 @@ fn ramp([full, none]: [f64; 2], height: f64) -> f64 {
     ((none - height) / (none - full)).clamp(0.0, 1.0)
 }
 
-/// Frame, place and weight wherever a knob stands; its weight is no number where it doesn't.
+/// Frame, place, weight and hold wherever a knob stands; its weight is no number where it doesn't.
 fn stances(
     path: &[Vector3<f64>],
     weights: &[f64],
     radius: f64,
     fps: f64,
     leg: f64,
-) -> Vec<(usize, Vector3<f64>, f64)> {
+) -> Vec<(usize, Vector3<f64>, f64, f64)> {
     let mut found = Vec::new();
     let mut f = 0;
     while f < path.len() {
@@ -354,6 +361,8 @@ fn stances(
         let stance = Stance {
             path: &path[f..end],
             weights: &weights[f..end],
+            begins: f > 0,
+            ends: end < path.len(),
             fps,
             leg,
         };
@@ -362,7 +371,7 @@ fn stances(
             let place = stance.place(i, &rest);
             let at = Vector3::new(place.x, place.y, radius);
             if *weight > 0.0 {
-                found.push((f + i, at, *weight));
+                found.push((f + i, at, *weight, weight * stance.hold(i)));
             }
         }
         f = end + 1;
@@ -374,6 +383,9 @@ fn stances(
 struct Stance<'a> {
     path: &'a [Vector3<f64>],
     weights: &'a [f64],
+    /// Whether the clip shows its beginning and its end.
+    begins: bool,
+    ends: bool,
     fps: f64,
     leg: f64,
 }
@@ -401,6 +413,19 @@ impl Stance<'_> {
             }
         }
         sum / total
+    }
+
+    /// Rises over the first frames and falls over the last.
+    fn hold(&self, i: usize) -> f64 {
+        let frames = TAKES_HOLD * self.fps + 1.0;
+        let after = if self.begins { (i + 1) as f64 } else { frames };
+        let before = if self.ends {
+            (self.path.len() - i) as f64
+        } else {
+            frames
+        };
+        let t = (after.min(before) / frames).min(1.0);
+        t * t * (3.0 - 2.0 * t)
     }
 
     /// Where the knob should be: at its rest, as long as it is near; where the source has it, once that slides.
