@@ -40,7 +40,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         contact: None,
         report: json!({ "masses": masses(&skeleton) }),
     };
-    Motion::from_poses(&skeleton, draft).save(Path::new(&out))?;
+    let mut motion = Motion::from_poses(&skeleton, draft);
+    motion.report["joint_torques"] = json!(motion.joint_torques(&skeleton));
+    motion.save(Path::new(&out))?;
     Ok(())
 }
 

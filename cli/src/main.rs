@@ -1,6 +1,7 @@
 //! `mimic`: from an animation clip to a physics character that performs it.
 
 mod args;
+mod checks;
 mod failure;
 mod locate;
 mod output;

@@ -1,7 +1,7 @@
 //! A motion with all its tracks, from coordinates alone.
 
 use super::timeline::Timeline;
-use super::wrench::Standing;
+use super::wrench::{Standing, Support};
 use super::{Cycle, Motion, MotionError, Tracks, contact, momentum, phase, velocity, wrench};
 use crate::clip::LoopMode;
 use crate::skeleton::Skeleton;
@@ -50,13 +50,19 @@ impl Motion {
             draft.fps,
             &timeline,
         );
-        let standing = Standing {
-            bodies: &draft.contact_bodies,
-            contact: &contact,
+        let support = Support {
+            skeleton,
+            bodies: &bodies,
+            com: &whole.com,
+            required: &required,
+            standing: Standing {
+                bodies: &draft.contact_bodies,
+                contact: &contact,
+            },
+            fps: draft.fps,
+            timeline: &timeline,
         };
-        let residual = wrench::residual(
-            skeleton, &bodies, &whole.com, &required, &standing, draft.fps, &timeline,
-        );
+        let residual = (0..bodies.len()).map(|f| support.residual(f)).collect();
         let tracks = Tracks {
             phase: phase::phase(draft.qpos.len()),
             com: whole.com,

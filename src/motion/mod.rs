@@ -7,15 +7,18 @@ mod file;
 mod momentum;
 mod nnls;
 mod phase;
+mod quality;
 mod sample;
 pub mod skate;
 mod summary;
 mod timeline;
+mod torque;
 mod velocity;
 mod wrench;
 
 pub use build::Draft;
 pub use error::MotionError;
+pub use quality::Check;
 pub use summary::{ContactShare, Extent, Summary};
 
 use crate::clip::LoopMode;

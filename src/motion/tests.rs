@@ -284,3 +284,51 @@ fn damaged_files_never_panic() {
         }
     }
 }
+
+/// The checks of a character that stands in its rest pose: weight borne by its feet, and hardly any torque.
+#[test]
+fn a_standing_character_passes_every_check() {
+    let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
+    let feet = ["left_foot", "right_foot"]
+        .map(|name| skeleton.bodies.iter().position(|b| b.name == name))
+        .map(|foot| foot.expect("it has feet"));
+    let mut qpos = skeleton.rest_qpos();
+    qpos[2] -= skeleton.lowest_point(&skeleton.forward(&qpos));
+    let draft = |qpos: Vec<Vec<f64>>| Draft {
+        name: "standing".into(),
+        fps: 60.0,
+        loop_mode: LoopMode::Clamp,
+        cycle: Cycle::NONE,
+        qpos,
+        contact_bodies: feet.to_vec(),
+        contact: None,
+        report: serde_json::Value::Null,
+    };
+    let still = Motion::from_poses(&skeleton, draft(vec![qpos.clone(); 60]));
+    let quality = still.quality(&skeleton);
+    let failed: Vec<_> = quality.iter().filter(|c| !c.passed).collect();
+    assert!(failed.is_empty(), "{failed:?}");
+    // Knees under the hips: each leg bears half of what is above it along the bone.
+    let knees = skeleton.bodies.iter().filter(|b| b.name.ends_with("shin"));
+    let dofs: Vec<usize> = knees.map(|b| b.joints[0].dof).collect();
+    let torques = still.joint_torques(&skeleton);
+    assert!(dofs.iter().all(|dof| torques[30][*dof].abs() < 5.0));
+
+    let sunk = |f: usize| {
+        qpos.iter()
+            .enumerate()
+            .map(move |(i, q)| q - if i == 2 && f == 40 { 0.05 } else { 0.0 })
+    };
+    let jumps = (0..60).map(|f| sunk(f).collect()).collect();
+    let jumping = Motion::from_poses(&skeleton, draft(jumps)).quality(&skeleton);
+    let failed: Vec<_> = jumping
+        .iter()
+        .filter(|c| !c.passed)
+        .map(|c| (c.id, c.frame))
+        .collect();
+    assert!(failed.contains(&("penetration", Some(40))), "{failed:?}");
+    assert!(
+        failed.iter().any(|(id, _)| *id == "smoothness"),
+        "{failed:?}"
+    );
+}

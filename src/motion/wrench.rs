@@ -11,19 +11,31 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3, Vector6};
 use std::f64::consts::TAU;
 
 /// Earth's standard gravity as MuJoCo's default has it, m/s².
-const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 /// Half width of the window in which accelerations are fitted, s.
 const SMOOTHING: f64 = 0.05;
 /// Points of a body this close to its lowest one can carry load, in leg lengths.
 const SOLE: f64 = 0.03;
 /// Edges of the pyramid that stands for a friction cone: between them 8 % of its friction is missing, with four 29 %.
 const EDGES: usize = 8;
+/// What a load costs beside what it explains: little enough to change no load by more than a ten-thousandth.
+const EVENNESS: f64 = 0.01;
 
 /// Force (N) and moment about the centre of mass (N·m), world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wrench {
     pub(crate) force: Vector3<f64>,
     pub(crate) moment: Vector3<f64>,
+}
+
+/// What the ground gives a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Load {
+    pub(crate) body: usize,
+    /// World, metres.
+    pub(crate) point: Vector3<f64>,
+    /// N.
+    pub(crate) force: Vector3<f64>,
 }
 
 /// Which bodies stand on the ground.
@@ -61,12 +73,12 @@ pub(crate) fn required(
 }
 
 /// Frames on each side of the fitting window.
-fn reach(fps: f64) -> usize {
+pub(crate) fn reach(fps: f64) -> usize {
     (SMOOTHING * fps).round().max(1.0) as usize
 }
 
 /// First and second time derivative at `frame` of the quadratic through its window.
-fn derivatives(
+pub(crate) fn derivatives(
     frame: usize,
     fps: f64,
     timeline: &Timeline,
@@ -93,40 +105,88 @@ fn derivatives(
     }
 }
 
-/// Residual force (N) and moment about the root body's origin (N·m) in every frame, world axes.
-///
-/// Bodies count as standing if they do so within the window in which `required` was fitted, because its
-/// loads are those of the whole window.
-pub(crate) fn residual(
-    skeleton: &Skeleton,
-    bodies: &[Vec<Isometry3<f64>>],
-    com: &[Vector3<f64>],
-    required: &[Wrench],
-    standing: &Standing,
-    fps: f64,
-    timeline: &Timeline,
-) -> Vec<Vector6<f64>> {
-    let leg = skeleton.leg_length();
-    (0..bodies.len())
-        .map(|f| {
-            let stands = |c: usize| {
-                timeline
-                    .window(f, reach(fps))
-                    .filter_map(|i| timeline.locate(i))
-                    .any(|(_, at)| standing.contact[at][c])
-            };
-            let feet = standing.bodies.iter().enumerate();
-            let feet = feet.filter(|(c, _)| stands(*c)).map(|(_, body)| *body);
-            let loaded = feet.chain(lying(skeleton, &bodies[f], standing.bodies, leg));
-            let rays: Vec<Wrench> = loaded
-                .flat_map(|body| friction_rays(skeleton, &bodies[f], body, leg, &com[f]))
-                .collect();
-            let left = unexplained(&required[f], &rays, leg);
-            let arm = com[f] - bodies[f][0].translation.vector;
-            let moment = left.moment + arm.cross(&left.force);
-            Vector6::from_iterator(left.force.iter().chain(moment.iter()).copied())
-        })
-        .collect()
+/// A motion over the ground that has to carry it.
+pub(crate) struct Support<'a> {
+    pub(crate) skeleton: &'a Skeleton,
+    pub(crate) bodies: &'a [Vec<Isometry3<f64>>],
+    pub(crate) com: &'a [Vector3<f64>],
+    pub(crate) required: &'a [Wrench],
+    pub(crate) standing: Standing<'a>,
+    pub(crate) fps: f64,
+    pub(crate) timeline: &'a Timeline,
+}
+
+impl Support<'_> {
+    /// Force (N) and moment about the root body's origin (N·m) that the ground can't supply in frame `f`, world axes.
+    pub(crate) fn residual(&self, f: usize) -> Vector6<f64> {
+        let rays = self.rays(f);
+        let (a, b) = self.equations(f, &rays);
+        let left = &b - &a * nnls::solve(&a, &b);
+        let force = Vector3::new(left[0], left[1], left[2]);
+        let moment = Vector3::new(left[3], left[4], left[5]) * self.length();
+        let arm = self.com[f] - self.bodies[f][0].translation.vector;
+        let moment = moment + arm.cross(&force);
+        Vector6::from_iterator(force.iter().chain(moment.iter()).copied())
+    }
+
+    /// What the ground supplies in frame `f`: of all ways the one that is spread most evenly, so that feet don't push
+    /// against each other.
+    pub(crate) fn loads(&self, f: usize) -> Vec<Load> {
+        let rays = self.rays(f);
+        let (a, b) = self.equations(f, &rays);
+        let even = DMatrix::from_diagonal_element(rays.len(), rays.len(), EVENNESS);
+        let a = DMatrix::from_fn(6 + rays.len(), rays.len(), |i, j| {
+            if i < 6 { a[(i, j)] } else { even[(i - 6, j)] }
+        });
+        let b = b.resize_vertically(6 + rays.len(), 0.0);
+        let weights = nnls::solve(&a, &b);
+        let bearing = rays.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
+        let load = |(ray, weight): (&Load, &f64)| Load {
+            force: ray.force * *weight,
+            ..*ray
+        };
+        bearing.map(load).collect()
+    }
+
+    /// Forces of 1 N upwards along the edges of all friction pyramids.
+    ///
+    /// Bodies count as standing if they do so within the window in which `required` was fitted, because its
+    /// loads are those of the whole window.
+    fn rays(&self, f: usize) -> Vec<Load> {
+        let leg = self.skeleton.leg_length();
+        let near = |c: usize| {
+            let window = self.timeline.window(f, reach(self.fps));
+            let mut frames = window.filter_map(|i| self.timeline.locate(i));
+            frames.any(|(_, at)| self.standing.contact[at][c])
+        };
+        let tracked = self.standing.bodies;
+        let feet = tracked.iter().enumerate().filter(|(c, _)| near(*c));
+        let feet = feet.map(|(_, body)| *body);
+        let loaded = feet.chain(lying(self.skeleton, &self.bodies[f], tracked, leg));
+        loaded
+            .flat_map(|body| friction_rays(self.skeleton, &self.bodies[f], body, leg))
+            .collect()
+    }
+
+    /// Rays as columns and the required wrench; moments about the centre of mass count in newtons at a leg's length.
+    fn equations(&self, f: usize, rays: &[Load]) -> (DMatrix<f64>, DVector<f64>) {
+        let column = |force: &Vector3<f64>, moment: Vector3<f64>| {
+            let moment = moment / self.length();
+            Vector6::from_iterator(force.iter().chain(moment.iter()).copied())
+        };
+        let required = &self.required[f];
+        let target = column(&required.force, required.moment);
+        let columns: Vec<Vector6<f64>> = rays
+            .iter()
+            .map(|ray| column(&ray.force, (ray.point - self.com[f]).cross(&ray.force)))
+            .collect();
+        let a = DMatrix::from_fn(6, columns.len(), |row, j| columns[j][row]);
+        (a, DVector::from_column_slice(target.as_slice()))
+    }
+
+    fn length(&self) -> f64 {
+        self.skeleton.leg_length().max(1e-3)
+    }
 }
 
 /// Bodies that touch the ground though they have no contact track: whoever sits, kneels or lies is carried by them.
@@ -144,14 +204,13 @@ fn lying<'a>(
         .filter(move |body| skeleton.lowest_point_of(poses, &[*body]) <= SOLE * leg_length)
 }
 
-/// Edge forces of the friction pyramids under one body, of 1 N upwards each, with their moments about `com`.
+/// Edge forces of the friction pyramids under one body, of 1 N upwards each.
 fn friction_rays(
     skeleton: &Skeleton,
     poses: &[Isometry3<f64>],
     body: usize,
     leg_length: f64,
-    com: &Vector3<f64>,
-) -> Vec<Wrench> {
+) -> Vec<Load> {
     let friction = skeleton.bodies[body].friction;
     let lowest = skeleton.lowest_point_of(poses, &[body]);
     let points = skeleton.ground_points(poses, body);
@@ -160,36 +219,9 @@ fn friction_rays(
         let (sin, cos) = (TAU * edge as f64 / EDGES as f64).sin_cos();
         Vector3::new(friction * cos, friction * sin, 1.0)
     });
-    sole.flat_map(|point| {
-        edges.map(|force| Wrench {
-            force,
-            moment: (point - com).cross(&force),
-        })
-    })
-    .collect()
-}
-
-/// What remains of `required` when the rays, each with a weight of at least zero, explain all they can; moments
-/// count in newtons at a leg's length.
-fn unexplained(required: &Wrench, rays: &[Wrench], leg_length: f64) -> Wrench {
-    let length = leg_length.max(1e-3);
-    let column = |w: &Wrench| {
-        Vector6::from_iterator(
-            w.force
-                .iter()
-                .copied()
-                .chain((w.moment / length).iter().copied()),
-        )
-    };
-    let target = column(required);
-    let columns: Vec<Vector6<f64>> = rays.iter().map(column).collect();
-    let a = DMatrix::from_fn(6, columns.len(), |row, j| columns[j][row]);
-    let b = DVector::from_column_slice(target.as_slice());
-    let left = &b - &a * nnls::solve(&a, &b);
-    Wrench {
-        force: Vector3::new(left[0], left[1], left[2]),
-        moment: Vector3::new(left[3], left[4], left[5]) * length,
-    }
+    let load = |point: Vector3<f64>, force| Load { body, point, force };
+    sole.flat_map(|point| edges.map(|force| load(*point, force)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -204,17 +236,33 @@ mod tests {
         let head = head.expect("it has a head");
         let poses = skeleton.forward(&skeleton.rest_qpos());
         let point = skeleton.ground_points(&poses, head)[0];
-        let rays = friction_rays(&skeleton, &poses, head, 1.0, &point);
         let friction = skeleton.bodies[head].friction;
+        let timeline = Timeline {
+            frames: 1,
+            loop_mode: crate::clip::LoopMode::Clamp,
+            cycle: crate::motion::Cycle::NONE,
+        };
         for step in 0..16 {
             let (sin, cos) = (TAU * f64::from(step) / 16.0).sin_cos();
-            let left = |share: f64| {
-                let sideways = friction * share;
+            let left = |part: f64| {
+                let sideways = friction * part;
                 let required = Wrench {
                     force: Vector3::new(sideways * cos, sideways * sin, 1.0) * 100.0,
                     moment: Vector3::zeros(),
                 };
-                unexplained(&required, &rays, 1.0).force.norm()
+                let support = Support {
+                    skeleton: &skeleton,
+                    bodies: std::slice::from_ref(&poses),
+                    com: &[point],
+                    required: &[required],
+                    standing: Standing {
+                        bodies: &[head],
+                        contact: &[vec![true]],
+                    },
+                    fps: 30.0,
+                    timeline: &timeline,
+                };
+                support.residual(0).fixed_rows::<3>(0).norm()
             };
             assert!(left(0.92) < 1e-6, "direction {step}");
             assert!(left(1.05) > 1.0, "direction {step}");

@@ -1,11 +1,10 @@
 //! The cost of a trajectory: half the sum of squared residuals, with its gradient and Gauss–Newton matrix.
 
 use super::goals::Goals;
-use super::limits;
 use super::model::{Model, Pose, quaternion};
 use super::rotation::{left_jacobian_inverse, log, right_jacobian_inverse};
 use super::stance::Anchor;
-use crate::skeleton::JointKind;
+use crate::skeleton::{JointKind, limits};
 use nalgebra::{Matrix3, Vector3};
 
 /// Weights of the residuals; points count in metres with weight 1.

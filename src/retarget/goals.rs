@@ -1,11 +1,10 @@
 //! What every frame of the skeleton should look like: goals for points and turns, from the source's frames.
 
 use super::align::Alignment;
-use super::limits;
 use super::model::Model;
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
-use crate::skeleton::Skeleton;
+use crate::skeleton::{Skeleton, limits};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A point that follows the source: the origin of a body.

@@ -1,12 +1,11 @@
 //! How good a retargeted motion is, from the motion and its source alone: the solver's goals and anchors have no say.
 
-use super::limits;
 use super::reference::Reference;
 use super::source::Source;
 use crate::clip::{Clip, Problem, Severity};
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::motion::{Motion, skate::sole_speed};
-use crate::skeleton::Skeleton;
+use crate::skeleton::{Skeleton, limits};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
@@ -54,15 +53,20 @@ pub struct Report {
     pub penetration_m: Spread,
     /// Mean height above the ground of feet and hands while the source's stand, metres.
     pub float_m: f64,
+    /// Share of the frames in which a foot or hand stands and the source's doesn't, or the other way round.
+    #[serde(default)]
+    pub contact_disagreement: f64,
     /// Coordinates outside of their limits, summed over frames.
     pub joint_limit_violations: usize,
     pub map: Vec<MappedJoint>,
     pub problems: Vec<Problem>,
 }
 
-/// A foot or hand with what hangs on it, and whether the source's stands, by frame.
+/// A foot or hand with what hangs on it, whether the source's touches the ground, and whether it stands still there,
+/// by frame.
 pub(super) struct Contact {
     pub bodies: Vec<usize>,
+    pub touches: Vec<bool>,
     pub stands: Vec<bool>,
 }
 
@@ -83,6 +87,7 @@ pub(super) fn report(
         foot_skate_m_s: foot_skate(skeleton, contacts, motion),
         penetration_m: penetration(skeleton, &motion.bodies),
         float_m: float(skeleton, contacts, motion),
+        contact_disagreement: disagreement(contacts, motion),
         joint_limit_violations: motion
             .qpos
             .iter()
@@ -165,6 +170,18 @@ fn float(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
         .iter()
         .flat_map(|c| standing(c).map(move |f| height(f, &c.bodies).max(0.0)));
     Spread::of(heights).mean
+}
+
+fn disagreement(contacts: &[Contact], motion: &Motion) -> f64 {
+    let stands = |bodies: &[usize], f: usize| {
+        let mut row = motion.contact_bodies.iter().zip(&motion.tracks.contact[f]);
+        row.any(|(body, stands)| *stands && bodies.contains(body))
+    };
+    let differs = contacts.iter().flat_map(|c| {
+        let touches = c.touches.iter().enumerate();
+        touches.map(|(f, touches)| f64::from(*touches != stands(&c.bodies, f)))
+    });
+    Spread::of(differs).mean
 }
 
 /// A foot's speed from a frame to the next is that of the lowest of its bodies.

@@ -105,15 +105,19 @@ pub(super) fn measured(
     is_still: impl Fn(Slot, usize) -> bool,
 ) -> Vec<Contact> {
     let limbs = limbs(model, goals);
-    let on_bodies = |(slot, stands): Contacts| {
+    let on_bodies = |(slot, touches): Contacts| {
         let limb = limbs.iter().find(|l| goals.keys[l.key].slot == slot)?;
         let mut bodies: Vec<usize> = limb.knobs.iter().map(|k| model.knobs[*k].body).collect();
         bodies.dedup();
-        let stands = stands.iter().enumerate();
+        let stands = touches.iter().enumerate();
         let stands = stands
-            .map(|(f, stands)| *stands && is_still(slot, f))
+            .map(|(f, touches)| *touches && is_still(slot, f))
             .collect();
-        Some(Contact { bodies, stands })
+        Some(Contact {
+            bodies,
+            touches,
+            stands,
+        })
     };
     contacts.into_iter().filter_map(on_bodies).collect()
 }
@@ -333,7 +337,8 @@ fn held(
                 from: path[f],
                 at,
                 weight,
-                hold,
+                // Hands are led to the ground and away from it by their goals.
+                hold: if limb.is_foot { hold } else { weight },
             });
         }
     }

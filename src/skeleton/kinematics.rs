@@ -45,6 +45,14 @@ impl Joint {
     }
 }
 
+impl Joint {
+    /// World from body before this joint, from world from body after it; the identity before a free joint.
+    pub(crate) fn undo(&self, after: &Isometry3<f64>, qpos: &[f64]) -> Isometry3<f64> {
+        let own = self.apply(&Isometry3::identity(), qpos);
+        after * own.inverse()
+    }
+}
+
 impl Skeleton {
     /// World from body for every body at `qpos` (MuJoCo's `xpos` and `xquat`).
     ///

@@ -11,6 +11,7 @@ mod error;
 mod guard;
 mod inertia;
 mod kinematics;
+pub(crate) mod limits;
 mod load;
 mod measure;
 mod rotations;

@@ -84,12 +84,12 @@ def velocities(model, header, t):
 
 
 def wrenches(model, header, t):
-    """Force and moment at the root from mj_inverse, which is free of contacts here."""
+    """Force and moment at the root, and torques of the joints, from mj_inverse, which is free of contacts here."""
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     data = mujoco.MjData(model)
     qvel, inside = t["qvel"], slice(20, -20)
     qacc = (qvel[2:] - qvel[:-2]) * header["fps"] / 2
-    force, moment = [], []
+    force, moment, torques = [], [], []
     for q, v, a in zip(t["qpos"][1:-1], qvel[1:-1], qacc):
         data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
         mujoco.mj_inverse(model, data)
@@ -97,10 +97,13 @@ def wrenches(model, header, t):
         mujoco.mju_quat2Mat(r, data.qpos[3:7])
         force.append(data.qfrc_inverse[:3].copy())
         moment.append(r.reshape(3, 3) @ data.qfrc_inverse[3:6])
+        # What springs and dampers of the joints do is no drive.
+        torques.append((data.qfrc_inverse + data.qfrc_passive)[6:])
     ours = t["root_wrench_residual"][1:-1]
     return {
         "root force": relative(ours[inside, :3], force[inside]),
         "root moment": relative(ours[inside, 3:], moment[inside]),
+        "joint torques": relative(np.array(header["report"]["joint_torques"])[1:-1, 6:][inside], torques[inside]),
     }
 
 

@@ -1,6 +1,7 @@
 //! `mimic retarget`: a clip becomes a motion of a physics character.
 
 use crate::args::{ImportArgs, RetargetArgs};
+use crate::checks;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::output::{make_room, result_path, spare_input};
@@ -45,8 +46,11 @@ impl Args {
         let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
         spare_input(&output, &file)?;
         let Prepared {
-            motion, seconds, ..
+            motion,
+            skeleton,
+            seconds,
         } = preparation.run(printer)?;
+        let quality = motion.quality(&skeleton);
         make_room(&output, &file)?;
         let seconds = seconds.unwrap_or_default();
         motion
@@ -58,11 +62,14 @@ impl Args {
             "frames": frames,
             "seconds": seconds,
             "frames_per_second": frames as f64 / seconds.max(1e-9),
+            "quality": quality,
         });
         if let (Value::Object(report), Value::Object(found)) = (&mut report, motion.report) {
             report.extend(found);
         }
-        printer.result(&report, || text(&report))
+        printer.result(&report, || {
+            text(&report) + "\n" + checks::advice(&quality).trim_end()
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! `mimic tracks`: what a motion's body does: centre of mass, momenta, contacts, feasibility.
 
 use crate::args::{ImportArgs, RetargetArgs};
+use crate::checks;
 use crate::failure::Outcome;
 use crate::locate;
 use crate::output::{make_room, write_whole};
@@ -8,7 +9,8 @@ use crate::plot;
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use mimic::clip::LoopMode;
-use mimic::motion::{ContactShare, Extent, Motion, Summary};
+use mimic::motion::{Check, ContactShare, Extent, Motion, Summary};
+use mimic::skeleton::Skeleton;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -51,6 +53,7 @@ struct Report {
     cycle_heading_rad: f64,
     #[serde(flatten)]
     summary: Summary,
+    quality: Vec<Check>,
 }
 
 impl Args {
@@ -62,14 +65,16 @@ impl Args {
             "motion",
         )?;
         let preparation = Preparation::new(file, &self.import, &self.retarget);
-        let Prepared { motion, .. } = preparation.run(printer)?;
+        let Prepared {
+            motion, skeleton, ..
+        } = preparation.run(printer)?;
         if let Some(path) = &self.plot {
             save(path, &preparation.file, &plot::tracks(&motion), printer)?;
         }
         if let Some(path) = &self.csv {
             save(path, &preparation.file, &table(&motion), printer)?;
         }
-        let report = report(&motion);
+        let report = report(&motion, &skeleton);
         printer.result(&report, || text(&report))
     }
 }
@@ -81,7 +86,7 @@ fn save(path: &Path, input: &Path, text: &str, printer: &Printer) -> Outcome {
     Ok(())
 }
 
-fn report(motion: &Motion) -> Report {
+fn report(motion: &Motion, skeleton: &Skeleton) -> Report {
     Report {
         motion: motion.name.clone(),
         skeleton: motion.skeleton_name.clone(),
@@ -92,6 +97,7 @@ fn report(motion: &Motion) -> Report {
         cycle_translation_m: motion.cycle.translation.into(),
         cycle_heading_rad: motion.cycle.heading,
         summary: motion.summary(),
+        quality: motion.quality(skeleton),
     }
 }
 
@@ -136,7 +142,7 @@ fn text(report: &Report) -> String {
         )
         .ok();
     }
-    text
+    text + "\n" + checks::table(&report.quality).trim_end()
 }
 
 /// A row per frame.

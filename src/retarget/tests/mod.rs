@@ -264,6 +264,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
         knob,
         at: Vector3::new(0.1, 0.2, 0.0),
         weight: 0.6,
+        hold: 0.6,
     };
     (
         goals,

@@ -1,16 +1,15 @@
 //! Joint limits: how far a coordinate is outside, and the nearest coordinate inside.
 
-use super::model::{put_quaternion, quaternion};
-use super::rotation::{exp, log};
-use crate::skeleton::{Joint, JointKind, Skeleton};
-use nalgebra::Vector3;
+use super::kinematics::quaternion;
+use super::{Joint, JointKind, Skeleton};
+use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// Overshoot that counts as rounding, not as a violation, radians.
 const ROUNDING: f64 = 1e-6;
 
 /// Signed distance outside of a range; 0 inside.
-pub(super) fn outside(value: f64, [low, high]: [f64; 2]) -> f64 {
+pub(crate) fn outside(value: f64, [low, high]: [f64; 2]) -> f64 {
     if value < low {
         value - low
     } else if value > high {
@@ -22,8 +21,8 @@ pub(super) fn outside(value: f64, [low, high]: [f64; 2]) -> f64 {
 
 /// Exponential-map coordinates of a ball joint, and how far outside each is. Of the two rotation vectors that are
 /// the same turn (the short way and the long way round), the one that is less outside.
-pub(super) fn ball(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
-    let short = log(&quaternion(qpos, joint.qpos));
+pub(crate) fn ball(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+    let short = rotation_vector(&quaternion(qpos, joint.qpos));
     let excess = |v: &Vector3<f64>| {
         Vector3::from_fn(|i, _| {
             joint
@@ -44,6 +43,16 @@ pub(super) fn ball(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) 
     (short, beyond)
 }
 
+/// No longer than π.
+fn rotation_vector(q: &UnitQuaternion<f64>) -> Vector3<f64> {
+    let short = if q.w < 0.0 {
+        UnitQuaternion::new_unchecked(-q.into_inner())
+    } else {
+        *q
+    };
+    short.scaled_axis()
+}
+
 fn slack(joint: &Joint, qpos: &[f64]) -> f64 {
     joint
         .limits
@@ -52,7 +61,7 @@ fn slack(joint: &Joint, qpos: &[f64]) -> f64 {
 }
 
 /// Number of degrees of freedom outside of their range.
-pub(super) fn violations(skeleton: &Skeleton, qpos: &[f64]) -> usize {
+pub(crate) fn violations(skeleton: &Skeleton, qpos: &[f64]) -> usize {
     let joints = skeleton.bodies.iter().flat_map(|body| &body.joints);
     let count = |joint: &Joint| match joint.kind {
         JointKind::Free => 0,
@@ -69,19 +78,21 @@ pub(super) fn violations(skeleton: &Skeleton, qpos: &[f64]) -> usize {
 }
 
 /// Moves every coordinate that is outside to the border of its range.
-pub(super) fn clamp(skeleton: &Skeleton, qpos: &mut [f64]) {
+pub(crate) fn clamp(skeleton: &Skeleton, qpos: &mut [f64]) {
     clamp_hinges(skeleton, qpos);
     let joints = skeleton.bodies.iter().flat_map(|body| &body.joints);
     for joint in joints.filter(|joint| joint.kind == JointKind::Ball) {
         let (v, beyond) = ball(joint, qpos);
         if beyond != Vector3::zeros() {
-            put_quaternion(qpos, joint.qpos, &exp(&(v - beyond)));
+            let turn = UnitQuaternion::from_scaled_axis(v - beyond);
+            let q = [turn.w, turn.i, turn.j, turn.k];
+            qpos[joint.qpos..joint.qpos + 4].copy_from_slice(&q);
         }
     }
 }
 
 /// The same for hinges and slides only.
-pub(super) fn clamp_hinges(skeleton: &Skeleton, qpos: &mut [f64]) {
+pub(crate) fn clamp_hinges(skeleton: &Skeleton, qpos: &mut [f64]) {
     for joint in skeleton.bodies.iter().flat_map(|body| &body.joints) {
         if let JointKind::Hinge(_) | JointKind::Slide(_) = joint.kind {
             qpos[joint.qpos] -= slack(joint, qpos);
@@ -91,7 +102,7 @@ pub(super) fn clamp_hinges(skeleton: &Skeleton, qpos: &mut [f64]) {
 
 /// The same pose in the coordinates nearest to the frame before: hinges by whole turns inside of their ranges, and
 /// of a quaternion and its negative the nearer one.
-pub(super) fn unwrap(skeleton: &Skeleton, before: &[f64], qpos: &mut [f64]) {
+pub(crate) fn unwrap(skeleton: &Skeleton, before: &[f64], qpos: &mut [f64]) {
     for joint in skeleton.bodies.iter().flat_map(|body| &body.joints) {
         let at = joint.qpos;
         match joint.kind {

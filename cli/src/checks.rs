@@ -1,0 +1,43 @@
+//! A motion's checks as lines of text.
+
+use mimic::motion::Check;
+use std::fmt::Write;
+
+/// A line for every check, and what to do about those that aren't passed.
+pub fn table(checks: &[Check]) -> String {
+    let mut text = String::new();
+    for check in checks {
+        let verdict = if check.passed { "good" } else { "look" };
+        let (id, name) = (check.id, check.name);
+        writeln!(text, "{verdict}  {id:22} {:>16}  {name}", amounts(check)).ok();
+    }
+    text + &advice(checks)
+}
+
+/// What to do about the checks that aren't passed.
+pub fn advice(checks: &[Check]) -> String {
+    let mut text = String::new();
+    for check in checks.iter().filter(|check| !check.passed) {
+        let at = check
+            .frame
+            .map_or(String::new(), |f| format!(", frame {f}"));
+        writeln!(
+            text,
+            "{} ({}{at}): {}",
+            check.id,
+            amounts(check),
+            check.advice
+        )
+        .ok();
+    }
+    text
+}
+
+fn amounts(check: &Check) -> String {
+    let short = |value: f64| {
+        let text = format!("{value:.3}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
+    let amounts = format!("{} of {}", short(check.value), short(check.limit));
+    format!("{amounts} {}", check.unit).trim_end().to_owned()
+}
