@@ -159,13 +159,16 @@ fn sided(core: &str) -> &'static [(Part, f64)] {
 }
 
 /// What the core of a name without side means.
-fn central(core: &str) -> Option<Part> {
+fn central(core: &str) -> Option<(Part, f64)> {
     match core {
-        "hips" | "hip" | "pelvis" | "下半身" => Some(Part::Hips),
+        "hips" | "hip" | "pelvis" | "下半身" => Some((Part::Hips, 1.0)),
         "spine" | "chest" | "upperchest" | "torso" | "abdomen" | "thorax" | "waist" | "back"
-        | "lowerback" | "upperback" | "body" | "ribcage" | "上半身" => Some(Part::Trunk),
-        "neck" | "首" => Some(Part::Neck),
-        "head" | "skull" | "頭" => Some(Part::Head),
+        | "lowerback" | "upperback" | "body" | "ribcage" | "上半身" => Some((Part::Trunk, 1.0)),
+        "neck" | "首" => Some((Part::Neck, 1.0)),
+        // Parts of a neck, where there is no joint for the whole of it.
+        "lowerneck" => Some((Part::Neck, 0.9)),
+        "upperneck" => Some((Part::Neck, 0.8)),
+        "head" | "skull" | "頭" => Some((Part::Head, 1.0)),
         _ => None,
     }
 }
@@ -207,8 +210,9 @@ impl Label {
         let score = |found: &&(Part, f64)| found.0 == part;
         match side {
             Some(_) => sided(&self.core).iter().find(score).map_or(0.0, |s| s.1),
-            None if central(&self.core) == Some(part) => 1.0,
-            None => 0.0,
+            None => central(&self.core)
+                .filter(|c| c.0 == part)
+                .map_or(0.0, |c| c.1),
         }
     }
 }

@@ -89,12 +89,15 @@ fn neck_and_head(
     chest: usize,
 ) {
     let named = |part: Part| {
-        (0..labels.len()).find(|j| labels[*j].fits(part, None) > 0.0 && tree.is_above(chest, *j))
+        let fit = |j: usize| labels[j].fits(part, None);
+        let fitting = (0..labels.len()).filter(|&j| fit(j) > 0.0 && tree.is_above(chest, j));
+        fitting.reduce(|best, j| if fit(j) > fit(best) { j } else { best })
     };
     let said = |j: usize| format!("its name, `{}`", joints[j].name);
     match (named(Part::Neck), named(Part::Head)) {
         (Some(neck), Some(head)) if tree.is_above(neck, head) => {
-            found.insert(Slot::Neck, neck, 1.0, said(neck));
+            let fit = labels[neck].fits(Part::Neck, None);
+            found.insert(Slot::Neck, neck, fit, said(neck));
             found.insert(Slot::Head, head, 1.0, said(head));
         }
         (_, Some(head)) => found.insert(Slot::Head, head, 1.0, said(head)),

@@ -10,6 +10,8 @@ pub(crate) enum Format {
     Gltf,
     DeepMimic,
     Bvh,
+    Asf,
+    Amc,
 }
 
 /// How far into a text the words that tell its kind are looked for, in bytes.
@@ -36,7 +38,27 @@ pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
     if text.len() >= 9 && text[..9].eq_ignore_ascii_case(b"HIERARCHY") {
         return Ok(Format::Bvh);
     }
-    Err(refusal(text))
+    acclaim(text).ok_or_else(|| refusal(text))
+}
+
+/// Which of Acclaim's two texts this is, by a section that each must have.
+fn acclaim(text: &[u8]) -> Option<Format> {
+    if !text.starts_with(b"#") && !text.starts_with(b":") {
+        return None;
+    }
+    let head = text[..text.len().min(HEAD)].to_ascii_uppercase();
+    let begins = |line: &[u8], word: &[u8]| line.trim_ascii_start().starts_with(word);
+    let has = |words: &[&[u8]]| {
+        let mut lines = head.split(|&byte| byte == b'\n');
+        lines.any(|line| words.iter().any(|word| begins(line, word)))
+    };
+    if has(&[b":UNITS", b":ROOT", b":BONEDATA", b":HIERARCHY"]) {
+        Some(Format::Asf)
+    } else if has(&[b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"]) {
+        Some(Format::Amc)
+    } else {
+        None
+    }
 }
 
 /// What one of our own files says to be.
@@ -94,8 +116,6 @@ fn refusal(text: &[u8]) -> String {
         "an empty file; write it again"
     } else if head.starts_with(b"; FBX") || says(b"FBXHeaderExtension") {
         "an ASCII FBX file; save it as binary FBX"
-    } else if head.starts_with(b"#") && says(b":root") || says(b":bonedata") {
-        "an ASF/AMC file; convert it to FBX, glTF or BVH"
     } else if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\x1f\x8b") {
         "a packed archive; unpack it first"
     } else if head.starts_with(b"BLENDER") {
@@ -103,7 +123,7 @@ fn refusal(text: &[u8]) -> String {
     } else if says(b"<COLLADA") {
         "a COLLADA file; convert it to FBX, glTF or BVH"
     } else {
-        "no format that is known; give binary FBX, glTF, GLB, BVH or DeepMimic JSON"
+        "no format that is known; give FBX, glTF, GLB, BVH, AMC or DeepMimic JSON"
     };
     kind.to_owned()
 }
@@ -122,6 +142,9 @@ mod tests {
             Ok(Format::DeepMimic)
         );
         assert_eq!(detect(b"hierarchy\r\nROOT Hips"), Ok(Format::Bvh));
+        let asf = b"# by hand\r\n:version 1.10\r\n:units\r\n";
+        assert_eq!(detect(asf), Ok(Format::Asf));
+        assert_eq!(detect(b"#!OML:ASF\n:degrees\n1\n"), Ok(Format::Amc));
     }
 
     #[test]

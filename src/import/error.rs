@@ -1,5 +1,6 @@
 //! What can go wrong between a file and a clip.
 
+use super::acclaim::AcclaimError;
 use super::bvh::BvhError;
 use super::deepmimic::DeepMimicError;
 use super::fbx::FbxError;
@@ -25,12 +26,14 @@ pub enum Error {
     #[error("{file}: {source}")]
     Bvh { file: String, source: BvhError },
     #[error("{file}: {source}")]
+    Acclaim { file: String, source: AcclaimError },
+    #[error("{file}: {source}")]
     DeepMimic {
         file: String,
         source: DeepMimicError,
     },
-    #[error("{file}: holds no animation; export it with at least one take")]
-    NoTakes { file: String },
+    #[error("{file}: {reason}")]
+    NoTakes { file: String, reason: &'static str },
     #[error("{file}: holds no joints; export it with its skeleton")]
     NoJoints { file: String },
     #[error("{file}: no take `{wanted}`; it has {takes}")]

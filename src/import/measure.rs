@@ -59,16 +59,44 @@ impl Scale {
         Self { unit_m, name, size }
     }
 
+    /// Whether a person's size, or that of a child or giant, comes of `unit_m`.
+    fn allows(&self, unit_m: f64) -> bool {
+        let tall = self.size * unit_m / Self::PERSON_M;
+        self.size == 0.0 || (0.5..=2.0).contains(&tall)
+    }
+
     pub fn problem(&self) -> Option<Problem> {
         Some(Problem {
             id: "unit-guessed".to_owned(),
             severity: Severity::Note,
             message: format!(
-                "the format has no unit: {} make the figure {:.2} m, the nearest to a person's size; give another with --unit",
+                "no unit is stated: {} make the figure {:.2} m, the nearest to a person's size; give another with --unit",
                 self.name,
                 self.size * self.unit_m
             ),
         })
+    }
+}
+
+/// Metres per unit of a file that says `stated`, and what is to be told: some files state a unit that isn't theirs.
+pub(crate) fn unit(stated: Option<f64>, rest: &[Vector3<f64>]) -> (f64, Option<Problem>) {
+    let scale = Scale::guess(rest);
+    match stated {
+        Some(unit_m) if scale.allows(unit_m) => (unit_m, None),
+        Some(unit_m) => {
+            let tall = scale.size * unit_m;
+            let message = format!(
+                "the stated unit makes the figure {tall:.3} m tall: {} are taken instead; give another with --unit",
+                scale.name
+            );
+            let problem = Problem {
+                id: "unit-guessed".to_owned(),
+                severity: Severity::Warning,
+                message,
+            };
+            (scale.unit_m, Some(problem))
+        }
+        None => (scale.unit_m, scale.problem()),
     }
 }
 
@@ -119,5 +147,15 @@ mod tests {
         }
         assert_eq!(Scale::guess(&[]).unit_m, 1.0);
         assert!(of(0.1).unit_m > 0.0);
+    }
+
+    #[test]
+    fn a_stated_unit_is_believed_of_people() {
+        let of = |stated, height| unit(stated, &[Vector3::zeros(), Vector3::new(0.1, height, 0.0)]);
+        assert_eq!(of(Some(0.0254), 66.0), (0.0254, None));
+        assert_eq!(of(Some(0.0254), 40.0), (0.0254, None));
+        let (unit_m, problem) = of(Some(0.0254), 165.0);
+        assert!(unit_m == 0.01 && problem.is_some_and(|problem| problem.message.contains("4.191")));
+        assert_eq!(of(None, 1700.0).0, 0.001);
     }
 }

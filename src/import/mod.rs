@@ -3,6 +3,7 @@
 //! A reader per format turns bytes into a [`scene::Scene`]; everything after that is common: the choice of take
 //! and joints, canonical axes and metres, rigid transforms, sampling, loop detection.
 
+mod acclaim;
 mod axes;
 mod bind;
 mod bvh;
@@ -22,6 +23,7 @@ mod take;
 mod tree;
 mod upright;
 
+pub use acclaim::AcclaimError;
 pub use axes::{UnknownAxis, UpAxis};
 pub use bvh::BvhError;
 pub use deepmimic::DeepMimicError;
@@ -79,7 +81,7 @@ pub struct TakeInfo {
 /// What is in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
-    /// `fbx`, `gltf`, `bvh` or `deepmimic`.
+    /// `fbx`, `gltf`, `bvh`, `asf`, `amc` or `deepmimic`.
     pub format: String,
     pub takes: Vec<TakeInfo>,
     /// Place in `takes` of the one that is loaded when none is named.
@@ -108,8 +110,8 @@ pub fn load(path: impl AsRef<Path>, options: &Options) -> Result<Clip, Error> {
     read(&bytes_of(path, &file)?, &file, path.parent(), options)
 }
 
-/// Reads a take from a file's bytes. `file` names it; external buffers of a `.gltf` are taken from `folder` and
-/// nowhere else, and without a folder they are missing.
+/// Reads a take from a file's bytes. `file` names it; external buffers of a `.gltf` and the skeleton of an `.amc`
+/// are taken from `folder` and nowhere else, and without a folder they are missing.
 pub fn read(
     bytes: &[u8],
     file: &str,
@@ -141,6 +143,10 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
         file: owned(),
         source,
     };
+    let acclaim = |source| Error::Acclaim {
+        file: owned(),
+        source,
+    };
     Ok(match format {
         Format::Glb => Box::new(gltf::read_glb(bytes, folder).map_err(gltf)?),
         Format::Gltf => Box::new(gltf::read_json(bytes, folder).map_err(gltf)?),
@@ -150,6 +156,10 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
                 file: owned(),
                 source,
             })?)
+        }
+        Format::Asf => Box::new(acclaim::read_asf(bytes).map_err(acclaim)?),
+        Format::Amc => {
+            Box::new(acclaim::read_amc(bytes, file, stem(file), folder).map_err(acclaim)?)
         }
         Format::DeepMimic => {
             let read = deepmimic::read(bytes, stem(file));
@@ -177,7 +187,7 @@ fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Error> {
         problems.push(Problem {
             id: "no-takes".to_owned(),
             severity: Severity::Error,
-            message: "the file holds no animation; export it with at least one take".to_owned(),
+            message: format!("the file {}", scene.no_takes()),
         });
     }
     Ok(Inspection {

@@ -38,10 +38,14 @@ pub(crate) struct Take {
 
 /// An animation file after parsing. Nothing in it can be out of range any more.
 pub(crate) trait Scene {
-    /// `fbx`, `gltf`, `bvh` or `deepmimic`.
+    /// `fbx`, `gltf`, `bvh`, `asf`, `amc` or `deepmimic`.
     fn format(&self) -> &'static str;
     fn nodes(&self) -> &[Node];
     fn takes(&self) -> &[Take];
+    /// What a file without takes lacks, and what to do.
+    fn no_takes(&self) -> &'static str {
+        "holds no animation; export it with at least one take"
+    }
     /// Up axis of the file's coordinates, e.g. `+Y`.
     fn up_axis(&self) -> &str;
     /// Metres per unit of the file's coordinates.

@@ -5,15 +5,15 @@ use mimic::clip::Clip;
 use mimic::import::{self, Options};
 use std::path::Path;
 
-type Place = [f64; 3];
-type Matrix = [[f64; 3]; 3];
+pub(super) type Place = [f64; 3];
+pub(super) type Matrix = [[f64; 3]; 3];
 
-fn times(a: &Matrix, b: &Matrix) -> Matrix {
+pub(super) fn times(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|r| std::array::from_fn(|c| (0..3).map(|k| a[r][k] * b[k][c]).sum()))
 }
 
 /// Rotation about axis 0, 1 or 2.
-fn about(axis: usize, degrees: f64) -> Matrix {
+pub(super) fn about(axis: usize, degrees: f64) -> Matrix {
     let (s, c) = (degrees * std::f64::consts::PI / 180.0).sin_cos();
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut m = [[0.0; 3]; 3];
@@ -29,7 +29,7 @@ struct Joint {
 }
 
 /// World places of all joints and end sites, frame after frame, in the file's axes and units.
-fn evaluate(text: &str) -> Vec<Vec<Place>> {
+pub(super) fn evaluate(text: &str) -> Vec<Vec<Place>> {
     let (tree, motion) = text.split_once("MOTION").expect("a motion");
     let words: Vec<&str> = tree.split_whitespace().collect();
     let (mut joints, mut open): (Vec<Joint>, Vec<usize>) = (Vec::new(), Vec::new());
@@ -102,7 +102,7 @@ fn upright(place: &Place, up: char) -> Place {
 }
 
 /// The clip has the file's places, but for one turn about the vertical and the unit.
-fn agrees(clip: &Clip, expected: &[Vec<Place>], up: char, unit: f64, what: &str) {
+pub(super) fn agrees(clip: &Clip, expected: &[Vec<Place>], up: char, unit: f64, what: &str) {
     assert_eq!(clip.frames.len(), expected.len(), "{what}");
     let pairs: Vec<(Place, Place)> = (0..expected.len())
         .flat_map(|f| {

@@ -1,5 +1,6 @@
 //! Importers against evaluations of the formats' own formulas that share no code with them.
 
+mod acclaim;
 mod beside;
 mod bvh;
 mod damage;

@@ -23,7 +23,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FBX, glTF, BVH or DeepMimic files
+    /// FBX, glTF, BVH, AMC or DeepMimic files
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Clip to write, or a folder for many [default: NAME.clip in this folder]

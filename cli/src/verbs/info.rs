@@ -22,7 +22,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FBX, glTF, BVH or DeepMimic file, or a clip
+    /// FBX, glTF, BVH, ASF/AMC or DeepMimic file, or a clip
     file: PathBuf,
     /// Write the joint map to a file that can be edited and given to `retarget --map`
     #[arg(long, value_name = "FILE")]

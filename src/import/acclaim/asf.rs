@@ -1,0 +1,303 @@
+//! ASF: the skeleton.
+
+use super::AcclaimError;
+use super::lines::{Line, lines, short};
+use nalgebra::{UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+
+/// Most bones that a skeleton may have.
+const MOST_BONES: usize = 1 << 16;
+/// The CMU database and those after it count `length` units to an inch.
+const INCH_M: f64 = 0.0254;
+const ROOT: &str = "root";
+
+/// One number of a bone in a frame: along or about one of its axes, or a change of its length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Freedom {
+    Translation(usize),
+    Rotation(usize),
+    Length,
+}
+
+/// A bone, or the end of one that has none behind it.
+#[derive(Clone, Debug)]
+pub(super) struct Bone {
+    pub name: String,
+    pub parent: Option<usize>,
+    /// From its parent's start to its own, in world axes and the file's units.
+    pub offset: Vector3<f64>,
+    /// World from the bone's axes.
+    pub axes: UnitQuaternion<f64>,
+    /// In the order of its numbers, in which rotations are done, too.
+    pub freedoms: Vec<Freedom>,
+    pub is_end: bool,
+}
+
+/// The skeleton of an ASF file.
+pub(super) struct Skeleton {
+    /// The root first, and parents before their children.
+    pub bones: Vec<Bone>,
+    /// Metres per unit, where that is stated.
+    pub unit_m: Option<f64>,
+    /// Angles are in radians, not degrees.
+    pub is_radian: bool,
+}
+
+/// A bone as the file has it, which may state its angles' unit later.
+struct Draft {
+    line: usize,
+    name: String,
+    direction: [f64; 3],
+    length: f64,
+    angles: [f64; 3],
+    order: [usize; 3],
+    freedoms: Vec<Freedom>,
+}
+
+/// What has been read so far.
+struct Reader {
+    length: Option<f64>,
+    is_radian: bool,
+    root: Draft,
+    position: [f64; 3],
+    bones: Vec<Draft>,
+    /// A bone's names of its children, with the line that names them.
+    children: BTreeMap<String, Vec<(usize, String)>>,
+    /// How many names the hierarchy has so far.
+    named: usize,
+}
+
+/// Reads a skeleton.
+pub(super) fn read(text: &str) -> Result<Skeleton, AcclaimError> {
+    let mut reader = Reader {
+        length: None,
+        is_radian: false,
+        root: Draft::new(0, ROOT),
+        position: [0.0; 3],
+        bones: Vec::new(),
+        children: BTreeMap::new(),
+        named: 0,
+    };
+    let mut section = String::new();
+    for mut line in lines(text) {
+        if line.key.starts_with(':') {
+            section = line.key.to_ascii_lowercase();
+            continue;
+        }
+        match section.as_str() {
+            ":units" => reader.unit(&mut line)?,
+            ":root" => reader.root(&mut line)?,
+            ":bonedata" => reader.bone(&mut line)?,
+            ":hierarchy" => reader.family(&mut line)?,
+            _ => {}
+        }
+    }
+    reader.skeleton()
+}
+
+impl Draft {
+    fn new(line: usize, name: &str) -> Self {
+        Self {
+            line,
+            name: name.to_owned(),
+            direction: [0.0; 3],
+            length: 0.0,
+            angles: [0.0; 3],
+            order: [0, 1, 2],
+            freedoms: Vec::new(),
+        }
+    }
+}
+
+impl Reader {
+    fn unit(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
+        match line.key.to_ascii_lowercase().as_str() {
+            "length" => self.length = Some(line.number("a length")?),
+            "angle" => {
+                let unit = line.expect("deg or rad")?;
+                self.is_radian = match unit.to_ascii_lowercase().as_str() {
+                    "deg" | "degrees" => false,
+                    "rad" | "radians" => true,
+                    _ => return Err(line.unexpected(unit, "deg or rad")),
+                };
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn root(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
+        match line.key.to_ascii_lowercase().as_str() {
+            "order" => self.root.freedoms = freedoms(line)?,
+            "axis" => {
+                let letters = line.expect("an order of axes")?;
+                self.root.order = order(line, letters)?;
+            }
+            "position" => self.position = line.numbers("a position of three numbers")?,
+            "orientation" => self.root.angles = line.numbers("an orientation of three numbers")?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Whatever isn't known of a bone (its limits, masses, markers) is passed over.
+    fn bone(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
+        let key = line.key.to_ascii_lowercase();
+        if key == "begin" {
+            too_many(line, self.bones.len())?;
+            self.bones.push(Draft::new(line.number, ""));
+            return Ok(());
+        }
+        let Some(bone) = self.bones.last_mut() else {
+            return Err(line.unexpected(line.key, "`begin`"));
+        };
+        match key.as_str() {
+            "name" => bone.name = line.expect("a name")?.to_owned(),
+            "direction" => bone.direction = line.numbers("a direction of three numbers")?,
+            "length" => bone.length = line.number("a length")?,
+            "axis" => {
+                bone.angles = line.numbers("three angles and an order of axes")?;
+                bone.order = match line.next() {
+                    Some(letters) => order(line, letters)?,
+                    None => [0, 1, 2],
+                };
+            }
+            "dof" => bone.freedoms = freedoms(line)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn family(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
+        if matches!(line.key.to_ascii_lowercase().as_str(), "begin" | "end") {
+            return Ok(());
+        }
+        let children = self.children.entry(line.key.to_owned()).or_default();
+        self.named += 1;
+        while let Some(child) = line.next() {
+            self.named += 1;
+            too_many(line, self.named / 2)?;
+            children.push((line.number, child.to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Puts the bones in the order of the hierarchy, depth first.
+    fn skeleton(mut self) -> Result<Skeleton, AcclaimError> {
+        let broken = |line, reason| Err(AcclaimError::Broken { line, reason });
+        let mut drafts: BTreeMap<String, Draft> = BTreeMap::new();
+        for draft in std::mem::take(&mut self.bones) {
+            let (line, name) = (draft.line, short(&draft.name));
+            if draft.name.is_empty() {
+                return broken(line, "the bone has no name; give it one".to_owned());
+            }
+            if draft.name == ROOT || drafts.insert(draft.name.clone(), draft).is_some() {
+                return broken(line, format!("a second bone `{name}`; rename one of them"));
+            }
+        }
+        let mut bones = vec![self.grown(&self.root, None, Vector3::from(self.position))];
+        let mut open = self.waiting(ROOT, 0, Vector3::zeros());
+        while let Some((line, name, parent, offset)) = open.pop() {
+            let Some(draft) = drafts.remove(&name) else {
+                let reason = "stands there already or isn't in :bonedata; repair the hierarchy";
+                return broken(line, format!("bone `{}` {reason}", short(&name)));
+            };
+            let along = Vector3::from(draft.direction) * draft.length;
+            let bone = bones.len();
+            bones.push(self.grown(&draft, Some(parent), offset));
+            let behind = self.waiting(&name, bone, along);
+            if behind.is_empty() {
+                let end = Draft::new(0, &format!("{name}_end"));
+                bones.push(self.grown(&end, Some(bone), along));
+            }
+            open.extend(behind);
+        }
+        if let Some(draft) = drafts.values().min_by_key(|draft| draft.line) {
+            let name = short(&draft.name);
+            let reason = "hangs on no other in :hierarchy; add it there";
+            return broken(draft.line, format!("bone `{name}` {reason}"));
+        }
+        let length = self.length.filter(|length| *length > 0.0);
+        Ok(Skeleton {
+            bones,
+            unit_m: length.map(|length| INCH_M / length),
+            is_radian: self.is_radian,
+        })
+    }
+
+    /// Children of a bone, the last first: line, name, parent, and offset from the parent's start.
+    fn waiting(
+        &mut self,
+        name: &str,
+        parent: usize,
+        offset: Vector3<f64>,
+    ) -> Vec<(usize, String, usize, Vector3<f64>)> {
+        let children = self.children.remove(name).unwrap_or_default();
+        let children = children.into_iter().rev();
+        children
+            .map(|(line, child)| (line, child, parent, offset))
+            .collect()
+    }
+
+    fn grown(&self, draft: &Draft, parent: Option<usize>, offset: Vector3<f64>) -> Bone {
+        Bone {
+            name: draft.name.clone(),
+            parent,
+            offset,
+            axes: self.axes(draft),
+            freedoms: draft.freedoms.clone(),
+            is_end: parent.is_some() && draft.line == 0,
+        }
+    }
+
+    /// Angles about x, y, z, done in the bone's order about axes that stay.
+    fn axes(&self, draft: &Draft) -> UnitQuaternion<f64> {
+        let about = |axis: usize| {
+            let angle = draft.angles[axis];
+            let angle = if self.is_radian {
+                angle
+            } else {
+                angle.to_radians()
+            };
+            UnitQuaternion::from_axis_angle(&Vector3::ith_axis(axis), angle)
+        };
+        let [first, second, third] = draft.order;
+        about(third) * about(second) * about(first)
+    }
+}
+
+fn too_many(line: &Line, bones: usize) -> Result<(), AcclaimError> {
+    if bones < MOST_BONES {
+        return Ok(());
+    }
+    Err(line.broken(format!("more than {MOST_BONES} bones; split the file")))
+}
+
+/// An order of axes such as `XYZ`.
+fn order(line: &Line, letters: &str) -> Result<[usize; 3], AcclaimError> {
+    let axes: Vec<usize> = letters
+        .chars()
+        .filter_map(|letter| "XYZ".find(letter.to_ascii_uppercase()))
+        .collect();
+    match axes[..] {
+        [a, b, c] if a != b && b != c && a != c && letters.len() == 3 => Ok([a, b, c]),
+        _ => Err(line.unexpected(letters, "an order of axes such as XYZ")),
+    }
+}
+
+fn freedoms(line: &mut Line) -> Result<Vec<Freedom>, AcclaimError> {
+    let mut freedoms = Vec::new();
+    while let Some(word) = line.next() {
+        freedoms.push(match word.to_ascii_lowercase().as_str() {
+            "tx" => Freedom::Translation(0),
+            "ty" => Freedom::Translation(1),
+            "tz" => Freedom::Translation(2),
+            "rx" => Freedom::Rotation(0),
+            "ry" => Freedom::Rotation(1),
+            "rz" => Freedom::Rotation(2),
+            "l" => Freedom::Length,
+            _ => return Err(line.unexpected(word, "tx, ty, tz, rx, ry, rz or l")),
+        });
+    }
+    Ok(freedoms)
+}

@@ -1,0 +1,241 @@
+//! Acclaim's pair of text files: ASF, a skeleton, and AMC, its motion.
+//!
+//! A bone begins where its parent ends. With C the rotation of its axes and M that of its degrees of freedom, it stands in
+//! its parent by the parent's direction × length and then C · M · C⁻¹, so that without motion all is aligned to the world.
+
+mod amc;
+mod asf;
+mod beside;
+mod lines;
+
+use super::UpAxis;
+use super::measure;
+use super::scene::{Node, Scene, Take};
+use crate::clip::{Problem, Severity, slerp};
+use amc::Motion;
+use asf::{Bone, Freedom, Skeleton};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// Rate of the CMU motion capture database, Hz: AMC files don't state theirs.
+const USUAL_RATE: f64 = 120.0;
+
+/// Why an ASF or AMC file couldn't be read.
+#[derive(Debug, thiserror::Error)]
+pub enum AcclaimError {
+    #[error("an AMC file is motion without a skeleton, and {reason}")]
+    NoSkeleton { reason: String },
+    #[error("its skeleton {file}: {source}")]
+    Skeleton {
+        file: String,
+        source: Box<AcclaimError>,
+    },
+    #[error("line {line}: `{found}` where {expected} should be; repair that line")]
+    Unexpected {
+        line: usize,
+        found: String,
+        expected: &'static str,
+    },
+    #[error("line {line}: {reason}")]
+    Broken { line: usize, reason: String },
+    #[error("no frames; write the file again")]
+    NoFrames,
+}
+
+/// A skeleton and, from an AMC file, its motion.
+pub(crate) struct AcclaimScene {
+    skeleton: Skeleton,
+    nodes: Vec<Node>,
+    motion: Option<Motion>,
+    takes: Vec<Take>,
+    unit_m: f64,
+    problems: Vec<Problem>,
+    bytes_beside: usize,
+}
+
+/// Reads a skeleton, which has no take.
+pub(crate) fn read_asf(bytes: &[u8]) -> Result<AcclaimScene, AcclaimError> {
+    let skeleton = asf::read(&String::from_utf8_lossy(bytes))?;
+    Ok(scene(skeleton, None, 0))
+}
+
+/// Reads the motion in the file called `file`, whose skeleton is looked for in `folder`. `name` becomes the take's name,
+/// since the format has none.
+pub(crate) fn read_amc(
+    bytes: &[u8],
+    file: &str,
+    name: &str,
+    folder: Option<&Path>,
+) -> Result<AcclaimScene, AcclaimError> {
+    let (found, skeleton) = beside::skeleton(file, folder)?;
+    let bytes_beside = skeleton.len();
+    let read = asf::read(&String::from_utf8_lossy(&skeleton));
+    let skeleton = read.map_err(|source| AcclaimError::Skeleton {
+        file: found,
+        source: Box::new(source),
+    })?;
+    let motion = amc::read(&String::from_utf8_lossy(bytes), &skeleton)?;
+    let take = take(name, &motion);
+    let mut scene = scene(skeleton, Some(motion), bytes_beside);
+    scene.takes.push(take);
+    Ok(scene)
+}
+
+fn scene(skeleton: Skeleton, motion: Option<Motion>, bytes_beside: usize) -> AcclaimScene {
+    let (unit_m, problem) = measure::unit(skeleton.unit_m, &rest(&skeleton.bones));
+    let node = |bone: &Bone| Node {
+        name: bone.name.clone(),
+        parent: bone.parent,
+        is_bone: true,
+        is_plain: true,
+    };
+    AcclaimScene {
+        nodes: skeleton.bones.iter().map(node).collect(),
+        skeleton,
+        motion,
+        takes: Vec::new(),
+        unit_m,
+        problems: Vec::from_iter(problem),
+        bytes_beside,
+    }
+}
+
+fn take(name: &str, motion: &Motion) -> Take {
+    let mut problems = motion.problems.clone();
+    if motion.rate.is_none() {
+        problems.push(Problem {
+            id: "rate-assumed".to_owned(),
+            severity: Severity::Note,
+            message: format!(
+                "the format has no frame rate: {USUAL_RATE} per second are assumed, as in the CMU database; where that is wrong, add a line `:SAMPLES-PER-SECOND` with the right one to the file's head"
+            ),
+        });
+    }
+    let fps = motion.rate.unwrap_or(USUAL_RATE);
+    Take {
+        name: name.to_owned(),
+        start: 0.0,
+        end: (motion.frames() - 1) as f64 / fps,
+        fps,
+        animated: motion.columns.iter().map(|column| column.bone).collect(),
+        wraps: None,
+        channels: motion.columns.len(),
+        problems,
+        fault: None,
+    }
+}
+
+/// World places of the bones' starts without any motion.
+fn rest(bones: &[Bone]) -> Vec<Vector3<f64>> {
+    let mut places: Vec<Vector3<f64>> = Vec::with_capacity(bones.len());
+    for bone in bones {
+        places.push(bone.parent.map_or(bone.offset, |p| places[p] + bone.offset));
+    }
+    places
+}
+
+/// Transform of a bone in its parent, given the numbers of its degrees of freedom in the file's units and radians.
+fn local(bone: &Bone, numbers: &[f64]) -> Isometry3<f64> {
+    let mut place = Vector3::zeros();
+    let mut turn = UnitQuaternion::identity();
+    for (freedom, &number) in bone.freedoms.iter().zip(numbers) {
+        match *freedom {
+            Freedom::Translation(axis) => place[axis] += number,
+            // The first is done first, about axes that stay.
+            Freedom::Rotation(axis) => {
+                let axis = Vector3::ith_axis(axis);
+                turn = UnitQuaternion::from_axis_angle(&axis, number) * turn;
+            }
+            Freedom::Length => {}
+        }
+    }
+    let place = bone.offset + bone.axes * place;
+    let turn = bone.axes * turn * bone.axes.inverse();
+    Isometry3::from_parts(Translation3::from(place), turn)
+}
+
+impl AcclaimScene {
+    /// Transforms of all bones in their parents at a frame.
+    fn locals(&self, motion: &Motion, frame: usize) -> Vec<Isometry3<f64>> {
+        let still = |bone: &Bone| local(bone, &[]);
+        let mut locals: Vec<_> = self.skeleton.bones.iter().map(still).collect();
+        let row = motion.row(frame);
+        for column in &motion.columns {
+            let bone = &self.skeleton.bones[column.bone];
+            locals[column.bone] = local(bone, &row[column.first..]);
+        }
+        locals
+    }
+
+    /// The same between frames.
+    fn locals_at(&self, motion: &Motion, time: f64) -> Vec<Isometry3<f64>> {
+        let rate = motion.rate.unwrap_or(USUAL_RATE);
+        let (position, last) = ((time * rate).max(0.0), motion.frames() - 1);
+        let frame = (position as usize).min(last);
+        let blend = position - frame as f64;
+        let mut locals = self.locals(motion, frame);
+        if blend <= 1e-9 || frame == last {
+            return locals;
+        }
+        for (a, b) in locals.iter_mut().zip(self.locals(motion, frame + 1)) {
+            let place = a.translation.vector.lerp(&b.translation.vector, blend);
+            *a = Isometry3::from_parts(place.into(), slerp(&a.rotation, &b.rotation, blend));
+        }
+        locals
+    }
+}
+
+impl Scene for AcclaimScene {
+    fn format(&self) -> &'static str {
+        match self.motion {
+            Some(_) => "amc",
+            None => "asf",
+        }
+    }
+
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    fn takes(&self) -> &[Take] {
+        &self.takes
+    }
+
+    fn no_takes(&self) -> &'static str {
+        "is a skeleton without motion; give one of the .amc files that belong to it"
+    }
+
+    fn up_axis(&self) -> &str {
+        "+Y"
+    }
+
+    fn unit_m(&self) -> f64 {
+        self.unit_m
+    }
+
+    fn canonical_from_file(&self) -> Matrix3<f64> {
+        UpAxis::PlusY.canonical_from_file()
+    }
+
+    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let bones = &self.skeleton.bones;
+        let locals = match (&self.motion, at) {
+            (Some(motion), Some((_, time))) => self.locals_at(motion, time),
+            _ => bones.iter().map(|bone| local(bone, &[])).collect(),
+        };
+        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(bones.len());
+        for (bone, local) in bones.iter().zip(locals) {
+            let local = local.to_homogeneous();
+            world.push(bone.parent.map_or(local, |parent| world[parent] * local));
+        }
+        world
+    }
+
+    fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+
+    fn bytes_beside(&self) -> usize {
+        self.bytes_beside
+    }
+}
