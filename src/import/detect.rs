@@ -1,5 +1,6 @@
 //! What kind of file some bytes are, by their content.
 
+use super::fbx::is_ascii as is_ascii_fbx;
 use safetensors::SafeTensors;
 
 /// A format that can be read.
@@ -22,7 +23,7 @@ pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
     if let Some(format) = own_format(bytes) {
         return Err(own_refusal(&format));
     }
-    if bytes.starts_with(b"Kaydara FBX Binary") {
+    if bytes.starts_with(b"Kaydara FBX Binary") || is_ascii_fbx(bytes) {
         return Ok(Format::Fbx);
     }
     if bytes.starts_with(b"glTF") {
@@ -114,8 +115,6 @@ fn refusal(text: &[u8]) -> String {
     let says = |word: &[u8]| head.windows(word.len()).any(|w| w == word);
     let kind = if text.is_empty() {
         "an empty file; write it again"
-    } else if head.starts_with(b"; FBX") || says(b"FBXHeaderExtension") {
-        "an ASCII FBX file; save it as binary FBX"
     } else if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\x1f\x8b") {
         "a packed archive; unpack it first"
     } else if head.starts_with(b"BLENDER") {
@@ -135,6 +134,7 @@ mod tests {
     #[test]
     fn content_decides() {
         assert_eq!(detect(b"Kaydara FBX Binary  \0\x1a\0"), Ok(Format::Fbx));
+        assert_eq!(detect(b"; FBX 7.4.0 project file"), Ok(Format::Fbx));
         assert_eq!(detect(b"glTF\x02\0\0\0"), Ok(Format::Glb));
         assert_eq!(detect(b"\xef\xbb\xbf {\"asset\":{}}"), Ok(Format::Gltf));
         assert_eq!(
@@ -174,7 +174,6 @@ mod tests {
     #[test]
     fn what_cannot_be_read_is_named() {
         let refused = |bytes: &[u8]| detect(bytes).expect_err("refused");
-        assert!(refused(b"; FBX 7.4.0 project file").contains("ASCII FBX"));
         assert!(refused(b"").contains("empty"));
         assert!(refused(b"{\"Skeleton\":{}}").contains("character"));
         assert!(refused(b"{\"a\":1}").contains("glTF"));

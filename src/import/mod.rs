@@ -168,10 +168,10 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
                 source,
             })?)
         }
-        Format::Fbx => Box::new(fbx::read(bytes).map_err(|source| Error::Fbx {
+        Format::Fbx => fbx::open(bytes).map_err(|source| Error::Fbx {
             file: owned(),
             source,
-        })?),
+        })?,
     })
 }
 

@@ -1,10 +1,15 @@
 //! Importers against evaluations of the formats' own formulas that share no code with them.
 
 mod acclaim;
+mod acclaim_reference;
 mod beside;
 mod bvh;
 mod damage;
 mod deepmimic;
+#[cfg(feature = "ufbx")]
+mod fbx_kinds;
+#[cfg(feature = "ufbx")]
+mod fbx_rewritten;
 mod gltf;
 mod gltf_kept;
 mod gltf_made;

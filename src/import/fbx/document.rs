@@ -60,7 +60,7 @@ impl<'a> Document<'a> {
 /// Checks the header and gives the version, e.g. 7400.
 fn version(bytes: &[u8]) -> Result<u32, FbxError> {
     let Some(rest) = bytes.strip_prefix(MAGIC) else {
-        return Err(if looks_like_text(bytes) {
+        return Err(if is_ascii(bytes) {
             FbxError::Ascii
         } else {
             FbxError::NotFbx
@@ -78,7 +78,8 @@ fn version(bytes: &[u8]) -> Result<u32, FbxError> {
     }
 }
 
-fn looks_like_text(bytes: &[u8]) -> bool {
+/// Whether this is FBX as a text.
+pub(crate) fn is_ascii(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     let has = |word: &[u8]| head.windows(word.len()).any(|window| window == word);
     !head.contains(&0) && (head.starts_with(b"; FBX") || has(b"FBXHeaderExtension:"))

@@ -1,7 +1,9 @@
-//! FBX, binary, versions 7.0 to 7.9.
+//! FBX. Binary files of versions 7.0 to 7.9 are read here, all others, with the feature `ufbx`, by that library.
 
 mod array;
 mod bind;
+#[cfg(feature = "ufbx")]
+mod by_ufbx;
 mod curve;
 mod document;
 mod keys;
@@ -34,6 +36,7 @@ use crate::import::bind::{Binds, Stand, pose};
 use crate::import::scene::{Node, Scene, Take};
 use curve::Curve;
 use document::Document;
+pub(crate) use document::is_ascii;
 use layers::{Animation, Curves};
 use nalgebra::{Matrix3, Matrix4};
 use nodes::{Rig, Tree};
@@ -48,12 +51,20 @@ use transform::World;
 pub enum FbxError {
     #[error("not an FBX file; check that it was downloaded whole, and what wrote it")]
     NotFbx,
-    #[error("ASCII FBX isn't supported; save as binary FBX 7.4 or newer")]
+    #[error(
+        "this build, without the feature `ufbx`, can't read ASCII FBX; save as binary FBX 7.4 or newer"
+    )]
     Ascii,
-    #[error("big-endian FBX isn't supported; save as binary FBX 7.4 or newer")]
+    #[error(
+        "this build, without the feature `ufbx`, can't read big-endian FBX; save as binary FBX 7.4 or newer"
+    )]
     BigEndian,
-    #[error("FBX version {found} isn't supported; save as binary FBX 7.4 or 7.5")]
+    #[error(
+        "this build, without the feature `ufbx`, can't read FBX version {found}; save as binary FBX 7.4 or 7.5"
+    )]
     Version { found: u32 },
+    #[error("ufbx can't read it ({reason}); export it again, best as binary FBX 7.4 or newer")]
+    Ufbx { reason: String },
     #[error("broken FBX at {place}: {reason}; export or download it again")]
     Broken { place: String, reason: String },
     #[error("take `{take}`, {driven}, animation curve {id}: {reason}; export or download it again")]
@@ -85,8 +96,19 @@ pub(crate) struct FbxScene {
     problems: Vec<Problem>,
 }
 
-/// Parses a binary FBX file.
-pub(crate) fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
+/// Parses an FBX file of any kind that this build can read.
+pub(crate) fn open(bytes: &[u8]) -> Result<Box<dyn Scene>, FbxError> {
+    match read(bytes) {
+        #[cfg(feature = "ufbx")]
+        Err(FbxError::Ascii | FbxError::BigEndian | FbxError::Version { .. }) => {
+            Ok(Box::new(by_ufbx::read(bytes)?))
+        }
+        read => Ok(Box::new(read?)),
+    }
+}
+
+/// Parses a binary FBX file of version 7.
+fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     let document = Document::parse(bytes)?;
     let settings = Settings::read(&document);
     let templates = Templates::read(&document);
@@ -139,13 +161,8 @@ impl FbxScene {
         if binds.is_empty() {
             return;
         }
-        let up = self.settings.canonical_from_file.row(2).transpose();
-        let stand = Stand {
-            nodes: &self.nodes,
-            world: &self.placed(None),
-            up: Some(up),
-        };
-        if let Some((world, problem)) = pose(&stand, binds.into_iter()) {
+        let placed = self.placed(None);
+        if let Some((world, problem)) = bound(&self.nodes, &placed, &self.settings, binds) {
             self.bound = Some(world);
             self.problems.push(problem);
         }
@@ -178,6 +195,21 @@ impl FbxScene {
     }
 }
 
+/// World matrices in the bind pose of nodes that are `placed` in another, and a note.
+fn bound(
+    nodes: &[Node],
+    placed: &[Matrix4<f64>],
+    settings: &Settings,
+    binds: Vec<Binds>,
+) -> Option<(Vec<Matrix4<f64>>, Problem)> {
+    let stand = Stand {
+        nodes,
+        world: placed,
+        up: Some(settings.canonical_from_file.row(2).transpose()),
+    };
+    pose(&stand, binds.into_iter())
+}
+
 fn warning(id: &str, message: &str) -> Problem {
     Problem {
         id: id.into(),
@@ -195,10 +227,14 @@ fn graph_problems(graph: &Graph, tree: &Tree) -> Vec<Problem> {
         ));
     }
     if graph.of_class("Constraint").next().is_some() {
-        let message = "constraints aren't evaluated; bake the animation before exporting if the motion looks wrong";
-        problems.push(warning("constraints-left-out", message));
+        problems.push(constraints_left_out());
     }
     problems
+}
+
+fn constraints_left_out() -> Problem {
+    let message = "constraints aren't evaluated; bake the animation before exporting if the motion looks wrong";
+    warning("constraints-left-out", message)
 }
 
 impl Scene for FbxScene {

@@ -51,8 +51,19 @@ impl Settings {
     pub fn read(document: &Document) -> Self {
         let record = document.record("GlobalSettings");
         let properties = record.map(Properties::of);
-        let int = |name: &str| properties.and_then(|p| p.int(name));
-        let real = |name: &str| properties.and_then(|p| p.real(name));
+        Self::of(
+            |name| properties.and_then(|p| p.int(name)),
+            |name| properties.and_then(|p| p.real(name)),
+            ticks(document),
+        )
+    }
+
+    /// The settings of properties that are looked up by their names.
+    pub fn of(
+        int: impl Fn(&str) -> Option<i64>,
+        real: impl Fn(&str) -> Option<f64>,
+        ticks: f64,
+    ) -> Self {
         let mut problems = Vec::new();
         let axis = |name: &str| signed_axis(int(name)?, int(&format!("{name}Sign")));
         let axes = Axes::new(axis("UpAxis"), axis("FrontAxis"), axis("CoordAxis"));
@@ -77,7 +88,7 @@ impl Settings {
             canonical_from_file: axes.canonical_from_file(),
             unit_m: unit / 100.0,
             fps: fps(int("TimeMode"), real("CustomFrameRate")),
-            ticks: ticks(document),
+            ticks,
             problems,
         }
     }

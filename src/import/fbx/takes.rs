@@ -57,8 +57,8 @@ pub(super) fn take(name: &str, stated: &Stated, animation: &Animation, curves: &
         own.any(|curve| curve.varies((start * ticks).round(), (end * ticks).round()))
     };
     let animated = animation.nodes().filter(moves).collect();
-    let fps = stated.fps;
-    let fps = fps.unwrap_or_else(|| spacing_fps(animation, curves, ticks).unwrap_or(FALLBACK_FPS));
+    let spacings = all_curves(animation, curves).flat_map(Curve::spacings);
+    let fps = rate(stated.fps, spacings, ticks);
     let mut take = Take {
         name: name.into(),
         start,
@@ -70,7 +70,9 @@ pub(super) fn take(name: &str, stated: &Stated, animation: &Animation, curves: &
         problems: Vec::new(),
         fault: None,
     };
-    take.problems = problems(&take, animation, curves, ticks);
+    take.problems = problems(&take, animation, curves);
+    let keyed = keyed.map(|(first, last)| (first / ticks, last / ticks));
+    take.problems.extend(span_problems(&take, keyed));
     take
 }
 
@@ -122,19 +124,28 @@ fn span(take: &Stated, keyed: Option<(f64, f64)>) -> (f64, f64) {
         ),
         keyed.map(|(first, last)| (first / ticks, last / ticks)),
     ];
-    let sane = |&(start, end): &(f64, f64)| end - start <= MAX_SECONDS;
-    let cut = || spans[2].map(|(start, _)| (start, start + MAX_SECONDS));
-    let whole = spans.into_iter().flatten().find(sane);
+    first_sane(&spans)
+}
+
+/// The first of `spans` that isn't too long, or, where all are, the beginning of the last, that of the keys.
+pub(super) fn first_sane(spans: &[Option<(f64, f64)>]) -> (f64, f64) {
+    let sane = |(start, end): &&(f64, f64)| end - start <= MAX_SECONDS;
+    let keyed = spans.last().copied().flatten();
+    let cut = || keyed.map(|(start, _)| (start, start + MAX_SECONDS));
+    let whole = spans.iter().flatten().find(sane).copied();
     whole.or_else(cut).unwrap_or((0.0, 0.0))
 }
 
+/// The rate that a file states, else that of its keys, else a usual one. `spacings` are in ticks.
+pub(super) fn rate(stated: Option<f64>, spacings: impl Iterator<Item = f64>, ticks: f64) -> f64 {
+    stated.unwrap_or_else(|| spacing_fps(spacings, ticks).unwrap_or(FALLBACK_FPS))
+}
+
 /// Frame rate of the keys' most common spacing; of equally common ones, the fastest.
-fn spacing_fps(animation: &Animation, curves: &[Curve], ticks: f64) -> Option<f64> {
+fn spacing_fps(spacings: impl Iterator<Item = f64>, ticks: f64) -> Option<f64> {
     let mut counts = BTreeMap::<u64, usize>::new();
-    for curve in all_curves(animation, curves) {
-        for spacing in curve.spacings().filter(|&spacing| spacing >= 1.0) {
-            *counts.entry(spacing as u64).or_default() += 1;
-        }
+    for spacing in spacings.filter(|&spacing| spacing >= 1.0) {
+        *counts.entry(spacing as u64).or_default() += 1;
     }
     let (spacing, _) = counts
         .into_iter()
@@ -151,7 +162,7 @@ fn spacing_fps(animation: &Animation, curves: &[Curve], ticks: f64) -> Option<f6
 }
 
 /// What a take's owner should know about it.
-fn problems(take: &Take, animation: &Animation, curves: &[Curve], ticks: f64) -> Vec<Problem> {
+fn problems(take: &Take, animation: &Animation, curves: &[Curve]) -> Vec<Problem> {
     let mut problems = Vec::new();
     if all_curves(animation, curves).any(|curve| curve.mended) {
         problems.push(super::warning(
@@ -162,18 +173,26 @@ fn problems(take: &Take, animation: &Animation, curves: &[Curve], ticks: f64) ->
             ),
         ));
     }
-    let mut note = |id: &str, message| {
-        problems.push(Problem {
-            id: id.into(),
-            severity: Severity::Note,
-            message,
-        });
-    };
     if animation.silent() > 0 {
         let (silent, name) = (animation.silent(), &take.name);
         let message = format!("take `{name}` has {silent} muted layers, which are left out");
-        note("muted-layers", message);
+        problems.push(note("muted-layers", message));
     }
+    problems
+}
+
+fn note(id: &str, message: String) -> Problem {
+    Problem {
+        id: id.into(),
+        severity: Severity::Note,
+        message,
+    }
+}
+
+/// What should be known of a take's span. `keyed` is that of its keys, in seconds.
+pub(super) fn span_problems(take: &Take, keyed: Option<(f64, f64)>) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    let mut note = |id, message| problems.push(note(id, message));
     if take.animated.is_empty() {
         note("empty-take", format!("take `{}` moves nothing", take.name));
     }
@@ -182,8 +201,8 @@ fn problems(take: &Take, animation: &Animation, curves: &[Curve], ticks: f64) ->
             "cut-take",
             format!("take `{}` is cut to its first six hours", take.name),
         );
-    } else if let Some((first, last)) = key_range(animation, curves) {
-        let (first, last, frame) = (first / ticks, last / ticks, 1.0 / take.fps);
+    } else if let Some((first, last)) = keyed {
+        let frame = 1.0 / take.fps;
         if first < take.start - frame || last > take.end + frame {
             note(
                 "keys-outside-take",

@@ -138,10 +138,10 @@ pub(super) fn slerp(a: &Matrix3<f64>, b: &Matrix3<f64>, weight: f64) -> Matrix3<
 }
 
 /// A node in its parent: translate, rotate, scale.
-struct Local {
-    translation: Vector3<f64>,
-    rotation: Matrix3<f64>,
-    scale: Vector3<f64>,
+pub(super) struct Local {
+    pub translation: Vector3<f64>,
+    pub rotation: Matrix3<f64>,
+    pub scale: Vector3<f64>,
 }
 
 /// `T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹`, the chain of FBX's documentation.
@@ -188,8 +188,12 @@ impl World {
     }
 
     pub fn child(&self, pose: &Pose, rules: &Rules) -> Self {
-        let local = local(pose, rules);
-        let (frame, received) = match rules.inherit {
+        self.below(&local(pose, rules), rules.inherit)
+    }
+
+    /// The world transform of a child that stands in this node by `local`.
+    pub fn below(&self, local: &Local, inherit: Inherit) -> Self {
+        let (frame, received) = match inherit {
             Inherit::RSrs => (self.linear(), Vector3::repeat(1.0)),
             Inherit::RrSs => (self.frame, self.scale),
             Inherit::Rrs => (self.frame, self.received),

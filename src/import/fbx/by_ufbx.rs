@@ -1,0 +1,314 @@
+//! ASCII, big-endian and old FBX files, read and evaluated by the C library `ufbx`.
+
+use super::settings::Settings;
+use super::takes::{first_sane, rate, span_problems};
+use super::transform::{Inherit, Local, Property, World};
+use super::{FbxError, bound, constraints_left_out};
+use crate::clip::Problem;
+use crate::import::bind::Binds;
+use crate::import::scene::{Node, Scene, Take};
+use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
+use std::time::{Duration, Instant};
+use ufbx::{AllocatorOpts, ElementType, LoadOpts, OpenFileCb, ProgressCb, ProgressResult};
+
+/// Bytes that any file may make ufbx take, and how many more per byte of it, for what it keeps and for what it needs
+/// on the way, each.
+const FREE_BYTES: usize = 64 << 20;
+const BYTES_PER_BYTE: usize = 32;
+/// Most time for reading, and bytes after which it is looked at. Files of a gigabyte take seconds.
+const MOST_TIME: Duration = Duration::from_secs(60);
+const LOOK_EVERY: u64 = 1 << 16;
+
+/// Elements that leave a node nothing but a transform.
+const PLAIN: [ElementType; 4] = [
+    ElementType::Unknown,
+    ElementType::Bone,
+    ElementType::Empty,
+    ElementType::Marker,
+];
+
+/// A file as ufbx has read it.
+pub(super) struct UfbxScene {
+    scene: ufbx::SceneRoot,
+    nodes: Vec<Node>,
+    /// ufbx's number of every node.
+    ids: Vec<usize>,
+    takes: Vec<Take>,
+    settings: Settings,
+    /// World matrices at rest, where that isn't how the nodes stand.
+    bound: Option<Vec<Matrix4<f64>>>,
+    problems: Vec<Problem>,
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
+    let scene = load(bytes)?;
+    let settings = settings(&scene);
+    let (nodes, ids) = tree(&scene);
+    let mut problems = settings.problems.clone();
+    if !scene.constraints.is_empty() {
+        problems.push(constraints_left_out());
+    }
+    let mut places = vec![None; scene.nodes.len()];
+    for (at, &id) in ids.iter().enumerate() {
+        places[id] = Some(at);
+    }
+    let stacks = (&scene.anim_stacks).into_iter();
+    let takes = stacks
+        .map(|stack| take(stack, &settings, &places))
+        .collect();
+    let binds = binds(&scene, &nodes, &places);
+    let mut scene = UfbxScene {
+        scene,
+        nodes,
+        ids,
+        takes,
+        settings,
+        bound: None,
+        problems,
+    };
+    if !binds.is_empty() {
+        let found = bound(&scene.nodes, &scene.placed(None), &scene.settings, binds);
+        scene.problems.extend(found.iter().map(|(_, p)| p.clone()));
+        scene.bound = found.map(|(world, _)| world);
+    }
+    Ok(scene)
+}
+
+/// Reads the bytes and no other file.
+fn load(bytes: &[u8]) -> Result<ufbx::SceneRoot, FbxError> {
+    let limit = || AllocatorOpts {
+        memory_limit: bytes
+            .len()
+            .saturating_mul(BYTES_PER_BYTE)
+            .saturating_add(FREE_BYTES),
+        ..AllocatorOpts::default()
+    };
+    let start = Instant::now();
+    let in_time = |_: &ufbx::Progress| match start.elapsed() < MOST_TIME {
+        true => ProgressResult::Continue,
+        false => ProgressResult::Cancel,
+    };
+    let nothing_beside = |_: &str, _: &ufbx::OpenFileInfo| None;
+    let options = LoadOpts {
+        temp_allocator: limit(),
+        result_allocator: limit(),
+        file_format: ufbx::FileFormat::Fbx,
+        ignore_geometry: true,
+        ignore_embedded: true,
+        load_external_files: false,
+        open_file_cb: OpenFileCb::Ref(&nothing_beside),
+        progress_cb: ProgressCb::Ref(&in_time),
+        progress_interval_hint: LOOK_EVERY,
+        ..LoadOpts::default()
+    };
+    ufbx::load_memory(bytes, options).map_err(|error| FbxError::Ufbx {
+        reason: error.description.to_lowercase(),
+    })
+}
+
+fn settings(scene: &ufbx::Scene) -> Settings {
+    let properties = &scene.settings.props;
+    Settings::of(
+        |name| Some(ufbx::find_prop(properties, name)?.value_int),
+        |name| Some(ufbx::find_prop(properties, name)?.value_vec4.x),
+        scene.metadata.ktime_second as f64,
+    )
+}
+
+/// All nodes but ufbx's root, depth first, and ufbx's numbers of them.
+fn tree(scene: &ufbx::Scene) -> (Vec<Node>, Vec<usize>) {
+    let (mut nodes, mut ids) = (Vec::new(), Vec::new());
+    let children = |node: &ufbx::Node, parent| -> Vec<(usize, Option<usize>)> {
+        let children = (&node.children).into_iter();
+        let mut open: Vec<_> = children.map(|child| (id(&child.element), parent)).collect();
+        open.reverse();
+        open
+    };
+    let mut open = children(&scene.root_node, None);
+    while let Some((id, parent)) = open.pop() {
+        let node = &scene.nodes[id];
+        open.extend(children(node, Some(nodes.len())));
+        nodes.push(Node {
+            name: node.element.name.to_string(),
+            parent,
+            is_bone: node.bone.is_some(),
+            is_plain: is_plain(node),
+        });
+        ids.push(id);
+    }
+    (nodes, ids)
+}
+
+fn id(element: &ufbx::Element) -> usize {
+    element.typed_id as usize
+}
+
+fn is_plain(node: &ufbx::Node) -> bool {
+    let mut attached = (&node.all_attribs).into_iter();
+    attached.all(|element| PLAIN.contains(&element.type_))
+}
+
+/// The curves that place nodes, with the node that each moves.
+fn curves(stack: &ufbx::AnimStack) -> impl Iterator<Item = (usize, &ufbx::AnimCurve)> {
+    let properties = (&stack.layers)
+        .into_iter()
+        .flat_map(|layer| &layer.anim_props);
+    let placing = properties.filter(|property| {
+        let is_node = property.element.type_ == ElementType::Node;
+        is_node && Property::named(property.prop_name.as_bytes()).is_some()
+    });
+    placing.flat_map(|property| {
+        let curves = property.anim_value.curves.iter().flatten();
+        curves.map(|curve| (id(&property.element), &**curve))
+    })
+}
+
+fn take(stack: &ufbx::AnimStack, settings: &Settings, places: &[Option<usize>]) -> Take {
+    let ticks = settings.ticks;
+    let keyed = curves(stack).filter_map(|(_, curve)| {
+        let keys = &curve.keyframes;
+        Some((keys.first()?.time, keys.last()?.time))
+    });
+    let keyed = keyed.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let stated = Some((stack.time_begin, stack.time_end)).filter(|(start, end)| end > start);
+    let (start, end) = first_sane(&[stated, keyed]);
+    let spacings = curves(stack).flat_map(|(_, curve)| {
+        let pairs = curve.keyframes.windows(2);
+        pairs.map(|pair| ((pair[1].time - pair[0].time) * ticks).round())
+    });
+    let moving = curves(stack).filter(|(_, curve)| varies(curve));
+    let mut animated: Vec<usize> = moving.filter_map(|(node, _)| places[node]).collect();
+    animated.sort_unstable();
+    animated.dedup();
+    let layers = (&stack.layers).into_iter();
+    let properties = layers.map(|layer| layer.anim_props.len()).sum::<usize>();
+    let mut take = Take {
+        name: stack.element.name.to_string(),
+        start,
+        end,
+        fps: rate(settings.fps, spacings, ticks),
+        animated,
+        wraps: None,
+        // Every layer is asked about every node.
+        channels: properties.max(stack.layers.len().saturating_mul(places.len())),
+        problems: Vec::new(),
+        fault: None,
+    };
+    take.problems = span_problems(&take, keyed);
+    take
+}
+
+/// Whether the keys differ, or a tangent leads away from them.
+fn varies(curve: &ufbx::AnimCurve) -> bool {
+    let keys = &curve.keyframes;
+    let slopes = |key: &ufbx::Keyframe| key.left.dy != 0.0 || key.right.dy != 0.0;
+    let differs = |key: &ufbx::Keyframe| key.value != keys[0].value;
+    keys.len() > 1 && keys.iter().any(|key| differs(key) || slopes(key))
+}
+
+/// The bind poses that the file keeps, of bones.
+fn binds(scene: &ufbx::Scene, nodes: &[Node], places: &[Option<usize>]) -> Vec<Binds> {
+    let poses = (&scene.poses).into_iter().filter(|pose| pose.is_bind_pose);
+    let bind = |bone: &ufbx::BonePose| {
+        let place = places[id(&bone.bone_node.element)]?;
+        let m = &bone.bone_to_world;
+        #[rustfmt::skip]
+        let matrix = Matrix4::new(
+            m.m00, m.m01, m.m02, m.m03,
+            m.m10, m.m11, m.m12, m.m13,
+            m.m20, m.m21, m.m22, m.m23,
+            0.0, 0.0, 0.0, 1.0,
+        );
+        let usable = matrix.iter().all(|&x| super::in_range(x));
+        (nodes[place].is_bone && usable).then_some((place, matrix))
+    };
+    poses
+        .map(|pose| pose.bone_poses.iter().filter_map(bind).collect())
+        .collect()
+}
+
+/// A node's transform in its parent.
+fn local(transform: &ufbx::Transform) -> Local {
+    let vector = |v: &ufbx::Vec3| Vector3::new(v.x, v.y, v.z);
+    let turn = &transform.rotation;
+    let turn = Quaternion::new(turn.w, turn.x, turn.y, turn.z);
+    let rotation = UnitQuaternion::try_new(turn, 1e-12);
+    Local {
+        translation: vector(&transform.translation),
+        rotation: rotation.map_or_else(Matrix3::identity, |turn| {
+            *turn.to_rotation_matrix().matrix()
+        }),
+        scale: vector(&transform.scale),
+    }
+}
+
+fn inherit(node: &ufbx::Node) -> Inherit {
+    match node.inherit_mode {
+        ufbx::InheritMode::Normal => Inherit::RSrs,
+        ufbx::InheritMode::IgnoreParentScale => Inherit::Rrs,
+        ufbx::InheritMode::ComponentwiseScale => Inherit::RrSs,
+    }
+}
+
+impl UfbxScene {
+    /// World matrices of all nodes at `at`, or as they stand in the file. Times are taken to the nearest tick of the
+    /// file's clock, so that a frame meets its keys exactly.
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let ticks = self.settings.ticks;
+        let moment = at.filter(|&(take, _)| take < self.takes.len());
+        let moment = moment.map(|(take, time)| {
+            let anim = &self.scene.anim_stacks[take].anim;
+            (anim, (time * ticks).round() / ticks)
+        });
+        let mut worlds: Vec<World> = Vec::with_capacity(self.nodes.len());
+        for (node, &id) in self.nodes.iter().zip(&self.ids) {
+            let theirs = &self.scene.nodes[id];
+            let local = match moment {
+                Some((anim, time)) => local(&ufbx::evaluate_transform(anim, theirs, time)),
+                None => local(&theirs.local_transform),
+            };
+            let parent = node
+                .parent
+                .map_or_else(World::root, |parent| worlds[parent]);
+            worlds.push(parent.below(&local, inherit(theirs)));
+        }
+        worlds.iter().map(World::matrix).collect()
+    }
+}
+
+impl Scene for UfbxScene {
+    fn format(&self) -> &'static str {
+        "fbx"
+    }
+
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    fn takes(&self) -> &[Take] {
+        &self.takes
+    }
+
+    fn up_axis(&self) -> &str {
+        &self.settings.up_axis
+    }
+
+    fn unit_m(&self) -> f64 {
+        self.settings.unit_m
+    }
+
+    fn canonical_from_file(&self) -> Matrix3<f64> {
+        self.settings.canonical_from_file
+    }
+
+    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        match (at, &self.bound) {
+            (None, Some(bound)) => bound.clone(),
+            _ => self.placed(at),
+        }
+    }
+
+    fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+}
