@@ -10,6 +10,8 @@ mod deepmimic;
 mod fbx_kinds;
 #[cfg(feature = "ufbx")]
 mod fbx_rewritten;
+#[cfg(feature = "ufbx")]
+mod formats;
 mod gltf;
 mod gltf_kept;
 mod gltf_made;
