@@ -36,6 +36,23 @@ pub(crate) struct Take {
     pub fault: Option<String>,
 }
 
+impl Take {
+    /// A take without length that moves nothing.
+    pub fn still(name: String) -> Self {
+        Self {
+            name,
+            start: 0.0,
+            end: 0.0,
+            fps: 30.0,
+            animated: Vec::new(),
+            wraps: None,
+            channels: 0,
+            problems: Vec::new(),
+            fault: None,
+        }
+    }
+}
+
 /// An animation file after parsing. Nothing in it can be out of range any more.
 pub(crate) trait Scene {
     /// `fbx`, `gltf`, `bvh`, `asf`, `amc` or `deepmimic`.

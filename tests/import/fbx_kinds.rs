@@ -250,6 +250,35 @@ fn lengths_and_depths_of_the_file_are_not_believed() {
     assert!(said.contains("memory"), "{said}");
 }
 
+/// Every layer is asked about every node: 20,000 of each, in two takes, would take their product.
+#[test]
+fn takes_of_implausibly_many_layers_are_refused() {
+    let many = 20_000;
+    let mut text = "; FBX 7.5.0 project file\nObjects: {\n".to_owned();
+    for stack in [1, 2] {
+        text += &format!("AnimationStack: {stack}, \"AnimStack::{stack}\", \"\" {{\n}}\n");
+    }
+    let mut links = String::new();
+    for k in 0..many {
+        let (layer, model) = (100_000 + k, 200_000 + k);
+        text += &format!("AnimationLayer: {layer}, \"AnimLayer::\", \"\" {{\n}}\n");
+        text += &format!("Model: {model}, \"Model::m\", \"LimbNode\" {{\n}}\n");
+        links += &format!("C: \"OO\",{layer},{}\nC: \"OO\",{model},0\n", 1 + k % 2);
+    }
+    text += &format!("}}\nConnections: {{\n{links}}}\n");
+    let start = Instant::now();
+    let said = read(text.as_bytes()).expect_err("refused");
+    assert!(
+        start.elapsed() < Duration::from_secs(10),
+        "{:?}",
+        start.elapsed()
+    );
+    assert!(
+        said.contains("10000 layers") && said.contains("merge"),
+        "{said}"
+    );
+}
+
 #[test]
 fn damaged_files_are_refused_or_read_whole() {
     let records = records(&kick());

@@ -186,7 +186,7 @@ impl Reader<'_> {
         }
         self.numbers.resize((self.begun - cut) * self.width, 0.0);
         self.problems.extend(self.stretched());
-        self.to_radians();
+        self.convert_degrees();
         Ok(Motion {
             columns: self.columns,
             numbers: self.numbers,
@@ -196,7 +196,7 @@ impl Reader<'_> {
         })
     }
 
-    fn to_radians(&mut self) {
+    fn convert_degrees(&mut self) {
         if self.is_radian {
             return;
         }

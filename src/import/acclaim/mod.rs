@@ -113,15 +113,12 @@ fn take(name: &str, motion: &Motion) -> Take {
     }
     let fps = motion.rate.unwrap_or(USUAL_RATE);
     Take {
-        name: name.to_owned(),
-        start: 0.0,
         end: (motion.frames() - 1) as f64 / fps,
         fps,
         animated: motion.columns.iter().map(|column| column.bone).collect(),
-        wraps: None,
         channels: motion.columns.len(),
         problems,
-        fault: None,
+        ..Take::still(name.to_owned())
     }
 }
 

@@ -19,6 +19,10 @@ const BYTES_PER_BYTE: usize = 32;
 const MOST_TIME: Duration = Duration::from_secs(60);
 const LOOK_EVERY: u64 = 1 << 16;
 
+/// Most layers × nodes and moved properties that the takes may have together: to place the nodes once, every layer is
+/// asked about every node. Real files have a thousandth.
+const MOST_QUESTIONS: usize = 1 << 24;
+
 /// Elements that leave a node nothing but a transform.
 const PLAIN: [ElementType; 4] = [
     ElementType::Unknown,
@@ -52,9 +56,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
     for (at, &id) in ids.iter().enumerate() {
         places[id] = Some(at);
     }
+    let mut budget = MOST_QUESTIONS;
     let stacks = (&scene.anim_stacks).into_iter();
     let takes = stacks
-        .map(|stack| take(stack, &settings, &places))
+        .map(|stack| take(stack, &settings, &places, &mut budget))
         .collect();
     let binds = binds(&scene, &nodes, &places);
     let mut scene = UfbxScene {
@@ -163,7 +168,46 @@ fn curves(stack: &ufbx::AnimStack) -> impl Iterator<Item = (usize, &ufbx::AnimCu
     })
 }
 
-fn take(stack: &ufbx::AnimStack, settings: &Settings, places: &[Option<usize>]) -> Take {
+/// Layers × nodes and moved properties of a take.
+fn questions(stack: &ufbx::AnimStack, nodes: usize) -> usize {
+    let properties = (&stack.layers).into_iter().map(|l| l.anim_props.len());
+    let layered = stack.layers.len().saturating_mul(nodes);
+    properties.sum::<usize>().saturating_add(layered)
+}
+
+/// A take, unless it is more work than is left in `budget`; then one that moves nothing and says why.
+fn take(
+    stack: &ufbx::AnimStack,
+    settings: &Settings,
+    places: &[Option<usize>],
+    budget: &mut usize,
+) -> Take {
+    let (name, layers) = (stack.element.name.to_string(), stack.layers.len());
+    let channels = questions(stack, places.len());
+    match budget.checked_sub(channels) {
+        Some(left) => {
+            *budget = left;
+            Take {
+                channels,
+                ..moving(stack, name, settings, places)
+            }
+        }
+        None => Take {
+            fault: Some(format!(
+                "take `{name}` has {layers} layers for {} nodes, more than can be evaluated; merge its layers",
+                places.len()
+            )),
+            ..Take::still(name)
+        },
+    }
+}
+
+fn moving(
+    stack: &ufbx::AnimStack,
+    name: String,
+    settings: &Settings,
+    places: &[Option<usize>],
+) -> Take {
     let ticks = settings.ticks;
     let keyed = curves(stack).filter_map(|(_, curve)| {
         let keys = &curve.keyframes;
@@ -180,19 +224,12 @@ fn take(stack: &ufbx::AnimStack, settings: &Settings, places: &[Option<usize>]) 
     let mut animated: Vec<usize> = moving.filter_map(|(node, _)| places[node]).collect();
     animated.sort_unstable();
     animated.dedup();
-    let layers = (&stack.layers).into_iter();
-    let properties = layers.map(|layer| layer.anim_props.len()).sum::<usize>();
     let mut take = Take {
-        name: stack.element.name.to_string(),
         start,
         end,
         fps: rate(settings.fps, spacings, ticks),
         animated,
-        wraps: None,
-        // Every layer is asked about every node.
-        channels: properties.max(stack.layers.len().saturating_mul(places.len())),
-        problems: Vec::new(),
-        fault: None,
+        ..Take::still(name)
     };
     take.problems = span_problems(&take, keyed);
     take
@@ -255,7 +292,8 @@ impl UfbxScene {
     /// file's clock, so that a frame meets its keys exactly.
     fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
         let ticks = self.settings.ticks;
-        let moment = at.filter(|&(take, _)| take < self.takes.len());
+        let usable = |take: usize| self.takes.get(take).is_some_and(|t| t.fault.is_none());
+        let moment = at.filter(|&(take, _)| usable(take));
         let moment = moment.map(|(take, time)| {
             let anim = &self.scene.anim_stacks[take].anim;
             (anim, (time * ticks).round() / ticks)
