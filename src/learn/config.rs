@@ -53,7 +53,7 @@ impl Default for Config {
             gamma: 0.95,
             lambda: 0.95,
             clip: 0.2,
-            epochs: 4,
+            epochs: 3,
             minibatch: 1024,
             shards: 4,
             value_coefficient: 0.5,

@@ -54,7 +54,8 @@ pub(super) fn parameters(settings: &Settings) -> IntegrationParameters {
 pub(super) fn build(character: &Character) -> Built {
     let mut scene = Scene {
         islands: IslandManager::new(),
-        broad_phase: BroadPhaseBvh::default(),
+        // Keeping the tree of a dozen shapes in best order costs more than it saves.
+        broad_phase: BroadPhaseBvh::with_optimization_strategy(BvhOptimizationStrategy::None),
         narrow_phase: NarrowPhase::new(),
         bodies: RigidBodySet::new(),
         colliders: ColliderSet::new(),
