@@ -59,6 +59,7 @@ pub struct Talk {
 pub enum Verb {
     Info(verbs::info::Args),
     Import(verbs::import::Args),
+    Edit(verbs::edit::Args),
     Retarget(verbs::retarget::Args),
     Tracks(verbs::tracks::Args),
     Train(verbs::train::Args),
@@ -118,6 +119,7 @@ impl ImportArgs {
             },
             up: self.up,
             unit_m: self.unit,
+            mirror: false,
         }
     }
 
@@ -185,7 +187,7 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 }
 
 /// `A..B`, `A..` or `..B`, in seconds.
-fn span(text: &str) -> Result<(f64, f64), String> {
+pub fn span(text: &str) -> Result<(f64, f64), String> {
     let seconds = |text: &str, open: f64| match text.trim().trim_end_matches('s') {
         "" => Ok(open),
         text => text

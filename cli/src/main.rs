@@ -2,6 +2,7 @@
 
 mod args;
 mod checks;
+mod clip_report;
 mod failure;
 mod locate;
 mod output;

@@ -14,11 +14,47 @@ pub enum Error {
     #[error("{}: not a clip that can be used: {reason}; import it again", path.display())]
     Broken { path: PathBuf, reason: String },
     #[error(
-        "a rate of {fps} frames per second can't be sampled; give a positive one that keeps the clip under 20 million transforms"
+        "a rate of {fps} frames per second can't be sampled; give a positive number up to 10000"
     )]
     Rate { fps: f64 },
     #[error("trim {from}..{to} s leaves nothing of a clip of {duration} s; trim within it")]
     EmptyTrim { from: f64, to: f64, duration: f64 },
+    #[error(
+        "{duration} s at {fps} Hz would be more than 20 million transforms; make it shorter or lower its rate"
+    )]
+    TooLong { duration: f64, fps: f64 },
+    #[error("{what} of {value} can't be used; give {wanted}")]
+    Number {
+        what: &'static str,
+        value: f64,
+        wanted: &'static str,
+    },
+    #[error("clip `{name}` can't be edited: {reason}; import it again")]
+    Unusable { name: String, reason: String },
+    #[error(
+        "the time-warp {from}:{to} doesn't fit; let both its times rise from 0:0 on, the first within the {duration} s of the clip"
+    )]
+    Warp { from: f64, to: f64, duration: f64 },
+    #[error("a mirror can't swap joints {left} and {right} of {joints}; pair every joint once")]
+    Pair {
+        left: usize,
+        right: usize,
+        joints: usize,
+    },
+    #[error("no clips to join; give at least one")]
+    NoClips,
+    #[error("clip `{name}` can't follow clip `{first}`: {reason}; join clips of one figure")]
+    OtherJoints {
+        name: String,
+        first: String,
+        reason: String,
+    },
+    #[error("no cycle of {shortest} s or more in {duration} s: {reason}")]
+    NoCycle {
+        shortest: f64,
+        duration: f64,
+        reason: &'static str,
+    },
 }
 
 impl Error {

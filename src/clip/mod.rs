@@ -1,11 +1,14 @@
 //! A clip: a tree of joints and their sampled rigid local transforms, in canonical space.
 
+mod carry;
+pub mod edit;
 mod error;
 mod file;
 mod sampling;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use carry::carry;
 pub use error::Error;
 pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
 
@@ -98,6 +101,27 @@ impl Clip {
     /// World transforms of all joints in the rest pose.
     pub fn rest_world(&self) -> Vec<Isometry3<f64>> {
         self.compose(|j| self.joints[j].rest)
+    }
+
+    /// World transform of joint `joint` at frame `frame`.
+    fn world_of(&self, joint: usize, frame: usize) -> Isometry3<f64> {
+        let up = std::iter::successors(Some(joint), |&j| self.joints[j].parent);
+        up.fold(Isometry3::identity(), |below, j| {
+            self.frames[frame][j] * below
+        })
+    }
+
+    /// The same joints and origin with other frames.
+    fn with_frames(&self, frames: Vec<Vec<Isometry3<f64>>>, fps: f64, loop_mode: LoopMode) -> Clip {
+        Clip {
+            name: self.name.clone(),
+            fps,
+            loop_mode,
+            joints: self.joints.clone(),
+            frames,
+            source: self.source.clone(),
+            problems: self.problems.clone(),
+        }
     }
 
     fn compose(&self, local: impl Fn(usize) -> Isometry3<f64>) -> Vec<Isometry3<f64>> {

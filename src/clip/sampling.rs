@@ -1,7 +1,7 @@
 //! A clip between its frames, at other rates, and in part.
 
 use super::{Clip, Error, LoopMode};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A rate this close to the wanted one, relative to it, counts as the wanted one: files write 1/30 s as 0.033332.
 const SAME_RATE: f64 = 1e-4;
@@ -19,13 +19,22 @@ pub(crate) fn slerp(
     a.try_slerp(b, t, 1e-12).unwrap_or(*a)
 }
 
-/// Transform a fraction `t` of the way from `a` to `b`.
-fn blend(a: &Isometry3<f64>, b: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
-    let translation = a.translation.vector.lerp(&b.translation.vector, t);
-    Isometry3::from_parts(
-        Translation3::from(translation),
-        slerp(&a.rotation, &b.rotation, t),
-    )
+/// The way made a fraction `t` into the step `now`, between the steps `before` and `after` where there are such: the
+/// cubic Hermite curve whose slopes are those of parabolas through three frames (Catmull and Rom, 1974).
+fn way(
+    before: Option<Vector3<f64>>,
+    now: Vector3<f64>,
+    after: Option<Vector3<f64>>,
+    t: f64,
+) -> Vector3<f64> {
+    let (start, end) = match (before, after) {
+        (Some(before), Some(after)) => (0.5 * (before + now), 0.5 * (now + after)),
+        (None, Some(after)) => (0.5 * (3.0 * now - after), 0.5 * (now + after)),
+        (Some(before), None) => (0.5 * (before + now), 0.5 * (3.0 * now - before)),
+        (None, None) => (now, now),
+    };
+    let (t2, t3) = (t * t, t * t * t);
+    now * (3.0 * t2 - 2.0 * t3) + start * (t3 - 2.0 * t2 + t) + end * (t3 - t2)
 }
 
 /// Evenly spaced frames over a span of time, the first at its start and the last at its end.
@@ -76,7 +85,8 @@ impl Grid {
 
 impl Clip {
     /// Transform of every joint in its parent at `time` seconds from the first frame. Before the first and after
-    /// the last frame, the clip stands still; a wrapping clip's later cycles are the motion's affair.
+    /// the last frame, the clip stands still; a wrapping clip's later cycles are the motion's affair. Between frames,
+    /// rotations turn at constant speed and translations follow a cubic curve.
     pub fn sample(&self, time: f64) -> Vec<Isometry3<f64>> {
         let last = self.frames.len().saturating_sub(1);
         let at = (time * self.fps).clamp(0.0, last as f64);
@@ -89,11 +99,23 @@ impl Clip {
         if t < 1e-9 {
             return a.clone();
         }
-        let b = &self.frames[(frame + 1).min(last)];
-        if t > 1.0 - 1e-9 {
-            return b.clone();
+        if t > 1.0 - 1e-9 || frame == last {
+            return self.frames[(frame + 1).min(last)].clone();
         }
-        a.iter().zip(b).map(|(a, b)| blend(a, b, t)).collect()
+        (0..a.len()).map(|j| self.between(frame, t, j)).collect()
+    }
+
+    /// Transform of joint `j` a fraction `t` of the way from frame `frame` to the next.
+    fn between(&self, frame: usize, t: f64, j: usize) -> Isometry3<f64> {
+        let at = |f: usize| self.frames[f][j].translation.vector;
+        let before = frame.checked_sub(1).map(|f| at(frame) - at(f));
+        let after = (frame + 2 < self.frames.len()).then(|| at(frame + 2) - at(frame + 1));
+        let way = way(before, at(frame + 1) - at(frame), after, t);
+        let (a, b) = (&self.frames[frame][j], &self.frames[frame + 1][j]);
+        Isometry3::from_parts(
+            Translation3::from(a.translation.vector + way),
+            slerp(&a.rotation, &b.rotation, t),
+        )
     }
 
     /// The same clip at another rate: the first and last frames stay, so the rate is the nearest to `fps` that
@@ -120,20 +142,18 @@ impl Clip {
         Ok(self.sampled(start, self.grid(end - start, self.fps)?, loop_mode))
     }
 
-    fn grid(&self, duration: f64, fps: f64) -> Result<Grid, Error> {
+    pub(super) fn grid(&self, duration: f64, fps: f64) -> Result<Grid, Error> {
         let most = MOST_TRANSFORMS / self.joints.len().max(1);
-        Grid::new(duration, fps, most).ok_or(Error::Rate { fps })
+        if Grid::new(0.0, fps, most).is_none() {
+            return Err(Error::Rate { fps });
+        }
+        Grid::new(duration, fps, most).ok_or(Error::TooLong { duration, fps })
     }
 
     fn sampled(&self, start: f64, grid: Grid, loop_mode: LoopMode) -> Clip {
         let frames = (0..grid.frames)
             .map(|f| self.sample(start + grid.time(f)))
             .collect();
-        Clip {
-            fps: grid.fps,
-            loop_mode,
-            frames,
-            ..self.clone()
-        }
+        self.with_frames(frames, grid.fps, loop_mode)
     }
 }

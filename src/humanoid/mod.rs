@@ -7,6 +7,7 @@ mod file;
 mod limbs;
 mod names;
 mod shape;
+mod sides;
 mod tree;
 mod trunk;
 
@@ -16,6 +17,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 pub use file::MapFileError;
+pub use sides::pairs;
 
 /// A place in the canonical humanoid. Serialised in kebab-case, e.g. `left-upper-leg`.
 ///

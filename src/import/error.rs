@@ -5,6 +5,8 @@ use super::bvh::BvhError;
 use super::deepmimic::DeepMimicError;
 use super::fbx::FbxError;
 use super::gltf::GltfError;
+use crate::clip;
+use crate::humanoid::NotHumanoid;
 
 /// Why a file couldn't become a clip. Every message names the file and says what to do.
 #[derive(Debug, thiserror::Error)]
@@ -79,4 +81,10 @@ pub enum Error {
         joint: String,
         place: String,
     },
+    #[error(
+        "{file}: left and right aren't known, so it can't be mirrored: {source}; import it without, then `mimic edit --mirror --map FILE`"
+    )]
+    NoSides { file: String, source: NotHumanoid },
+    #[error("{file}: {source}")]
+    Mirror { file: String, source: clip::Error },
 }

@@ -31,7 +31,9 @@ pub use error::Error;
 pub use fbx::FbxError;
 pub use gltf::GltfError;
 
+use crate::clip::edit::Plane;
 use crate::clip::{Clip, Grid, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity, Source};
+use crate::humanoid;
 use canonical::Rig;
 use detect::Format;
 use rigid::Frame;
@@ -66,6 +68,8 @@ pub struct Options {
     pub up: Option<UpAxis>,
     /// Metres per unit of the file's data, where its header is wrong.
     pub unit_m: Option<f64>,
+    /// Whether left and right change places.
+    pub mirror: bool,
 }
 
 /// One take of a file.
@@ -123,6 +127,9 @@ pub fn read(
     let read = bytes.len().saturating_add(scene.bytes_beside());
     let most = FREE_TRANSFORMS + (read as f64 * TRANSFORMS_PER_BYTE) as usize;
     let mut clip = clip(scene.as_ref(), file, take, options, most)?;
+    if options.mirror {
+        clip = mirrored(&clip, file)?;
+    }
     clip.source.sha256 = Sha256::digest(bytes)
         .iter()
         .map(|b| format!("{b:02x}"))
@@ -130,6 +137,21 @@ pub fn read(
     clip.problems.extend(note);
     clip.round_to_file();
     Ok(clip)
+}
+
+/// The clip in the mirror of its figure's sagittal plane.
+fn mirrored(clip: &Clip, file: &str) -> Result<Clip, Error> {
+    let map = humanoid::map(&clip.joints).map_err(|source| Error::NoSides {
+        file: file.to_owned(),
+        source,
+    })?;
+    let pairs = humanoid::pairs(&clip.joints, &map);
+    let plane = Plane::sagittal(&clip.joints, &pairs);
+    let mirrored = clip.mirror(&pairs, &plane);
+    mirrored.map_err(|source| Error::Mirror {
+        file: file.to_owned(),
+        source,
+    })
 }
 
 /// Hands the bytes to the reader of their format.

@@ -1,6 +1,7 @@
 //! Whether a clip's end joins its beginning.
 
-use nalgebra::{Isometry3, Rotation2, Vector2, Vector3};
+use crate::clip::carry;
+use nalgebra::{Isometry3, Vector3};
 
 /// Largest joint distance across the seam, relative to the skeleton's height: root mean square, and any joint.
 const SEAM_RMS: f64 = 0.02;
@@ -36,12 +37,8 @@ pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
         return false;
     }
     let height = world.first().map_or(0.0, |frame| extent(frame));
-    let carry = Carry::fit(first, last);
-    let gaps: Places = first
-        .iter()
-        .zip(last)
-        .map(|(a, b)| carry.place(a) - b)
-        .collect();
+    let onto_last = carry(first, last);
+    let gaps = gaps(&onto_last, first, last);
     let range = frames
         .iter()
         .map(|frame| rms(&difference(first, frame)))
@@ -55,7 +52,7 @@ pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
     }
     let onward: Places = difference(first, second)
         .iter()
-        .map(|v| carry.turn(v))
+        .map(|v| onto_last * v)
         .collect();
     runs_on(&frames, &difference(&difference(before, last), &onward))
 }
@@ -120,16 +117,14 @@ fn pose_range(frames: &[Places]) -> f64 {
     let Some(first) = frames.first() else {
         return 0.0;
     };
-    let away = |frame: &Places| {
-        let carry = Carry::fit(first, frame);
-        let gaps: Places = first
-            .iter()
-            .zip(frame)
-            .map(|(a, b)| carry.place(a) - b)
-            .collect();
-        rms(&gaps)
-    };
+    let away = |frame: &Places| rms(&gaps(&carry(first, frame), first, frame));
     frames.iter().map(away).fold(0.0, f64::max)
+}
+
+/// How far `a`, carried over the ground, is from `b`.
+fn gaps(carry: &Isometry3<f64>, a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
+    let place = |p: &Vector3<f64>| carry.rotation * p + carry.translation.vector;
+    a.iter().zip(b).map(|(a, b)| place(a) - b).collect()
 }
 
 pub(super) fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
@@ -139,46 +134,6 @@ pub(super) fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
 pub(super) fn rms(vectors: &[Vector3<f64>]) -> f64 {
     let square: f64 = vectors.iter().map(Vector3::norm_squared).sum();
     (square / vectors.len().max(1) as f64).sqrt()
-}
-
-/// A move over the ground: a turn about Z around `from`, then a shift to `to`.
-struct Carry {
-    heading: Rotation2<f64>,
-    from: Vector2<f64>,
-    to: Vector2<f64>,
-}
-
-impl Carry {
-    /// The move that brings `a` nearest to `b` in the least-squares sense (planar Procrustes).
-    fn fit(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Self {
-        let (from, to) = (centre(a), centre(b));
-        let (mut cross, mut dot) = (0.0, 0.0);
-        for (a, b) in a.iter().zip(b) {
-            let (a, b) = (a.xy() - from, b.xy() - to);
-            cross += a.perp(&b);
-            dot += a.dot(&b);
-        }
-        Self {
-            heading: Rotation2::new(cross.atan2(dot)),
-            from,
-            to,
-        }
-    }
-
-    fn place(&self, p: &Vector3<f64>) -> Vector3<f64> {
-        let flat = self.heading * (p.xy() - self.from) + self.to;
-        Vector3::new(flat.x, flat.y, p.z)
-    }
-
-    fn turn(&self, v: &Vector3<f64>) -> Vector3<f64> {
-        let flat = self.heading * v.xy();
-        Vector3::new(flat.x, flat.y, v.z)
-    }
-}
-
-fn centre(places: &[Vector3<f64>]) -> Vector2<f64> {
-    let sum: Vector2<f64> = places.iter().map(|p| p.xy()).sum();
-    sum / places.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -1,13 +1,12 @@
 //! `mimic import`: animation files become clips.
 
 use crate::args::ImportArgs;
+use crate::clip_report::ClipReport;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::output::{make_room, names_folder, result_path};
 use crate::printer::Printer;
-use mimic::clip::{Clip, LoopMode, Problem};
 use mimic::import;
-use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -29,6 +28,9 @@ pub struct Args {
     /// Clip to write, or a folder for many [default: NAME.clip in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
+    /// Swap left and right
+    #[arg(long)]
+    mirror: bool,
     #[command(flatten)]
     import: ImportArgs,
 }
@@ -37,18 +39,6 @@ pub struct Args {
 struct Step {
     input: PathBuf,
     output: PathBuf,
-}
-
-#[derive(Serialize)]
-struct Report {
-    clip: String,
-    fps: f64,
-    frames: usize,
-    duration_s: f64,
-    joints: usize,
-    #[serde(rename = "loop")]
-    loop_mode: LoopMode,
-    problems: Vec<Problem>,
 }
 
 impl Args {
@@ -60,7 +50,7 @@ impl Args {
             bar.set_message(step.input.display().to_string());
             match self.import(step) {
                 Ok(report) => {
-                    bar.suspend(|| printer.problems(&report.problems));
+                    bar.suspend(|| printer.problems(report.problems()));
                     reports.push(report);
                 }
                 Err(failure) => failures.push((step.input.as_path(), failure)),
@@ -72,7 +62,7 @@ impl Args {
             failures.pop().map_or(Ok(()), |(_, failure)| Err(failure))?;
             return reports
                 .iter()
-                .try_for_each(|one| printer.result(one, || line(one)));
+                .try_for_each(|one| printer.result(one, || one.line()));
         }
         print(&reports, &failures, printer)?;
         summary(failures, steps.len(), printer)
@@ -115,19 +105,22 @@ impl Args {
         }
     }
 
-    fn import(&self, step: &Step) -> Outcome<Report> {
+    fn import(&self, step: &Step) -> Outcome<ClipReport> {
         let Step { input, output } = step;
         if locate::has_extension(input, "clip") {
             return Err(Failure::input(
                 input,
-                "is a clip already, `mimic retarget` takes it as it is",
+                "is a clip already, `mimic retarget` takes it as it is and `mimic edit` changes it",
             ));
         }
-        let clip =
-            import::load(input, &self.import.options()).map_err(|e| Failure::input(input, e))?;
+        let options = import::Options {
+            mirror: self.mirror,
+            ..self.import.options()
+        };
+        let clip = import::load(input, &options).map_err(|e| Failure::input(input, e))?;
         make_room(output, input)?;
         clip.save(output).map_err(|e| Failure::write(output, e))?;
-        Ok(report(output, clip))
+        Ok(ClipReport::new(output, clip))
     }
 }
 
@@ -135,7 +128,7 @@ impl Args {
 type Failed<'a> = (&'a Path, Failure);
 
 /// The results of several files.
-fn print(reports: &[Report], failures: &[Failed], printer: &Printer) -> Outcome {
+fn print(reports: &[ClipReport], failures: &[Failed], printer: &Printer) -> Outcome {
     if printer.is_json() {
         let failure =
             |(file, failure): &Failed| json!({ "file": file, "message": failure.message() });
@@ -144,7 +137,7 @@ fn print(reports: &[Report], failures: &[Failed], printer: &Printer) -> Outcome 
     }
     reports
         .iter()
-        .try_for_each(|report| printer.text(&line(report)))
+        .try_for_each(|report| printer.text(&report.line()))
 }
 
 /// Ends as the worst of the files did.
@@ -160,32 +153,4 @@ fn summary(failures: Vec<Failed>, files: usize, printer: &Printer) -> Outcome {
         true => Err(Failure::user(message)),
         false => Err(Failure::work(message)),
     }
-}
-
-fn report(output: &Path, clip: Clip) -> Report {
-    Report {
-        clip: output.display().to_string(),
-        fps: clip.fps,
-        frames: clip.frames.len(),
-        duration_s: clip.duration(),
-        joints: clip.joints.len(),
-        loop_mode: clip.loop_mode,
-        problems: clip.problems,
-    }
-}
-
-fn line(report: &Report) -> String {
-    let loops = match report.loop_mode {
-        LoopMode::Wrap => "loops",
-        LoopMode::Clamp => "ends",
-    };
-    let Report {
-        clip,
-        fps,
-        frames,
-        duration_s,
-        joints,
-        ..
-    } = report;
-    format!("{clip}: {frames} frames at {fps:.1} Hz, {duration_s:.2} s, {joints} joints, {loops}")
 }

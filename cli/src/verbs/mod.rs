@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod completions;
 pub mod doctor;
+pub mod edit;
 pub mod eval;
 pub mod import;
 pub mod info;
@@ -22,6 +23,7 @@ pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
     match verb {
         Verb::Info(args) => args.run(library, printer),
         Verb::Import(args) => args.run(library, printer),
+        Verb::Edit(args) => args.run(library, printer),
         Verb::Retarget(args) => args.run(library, printer),
         Verb::Tracks(args) => args.run(library, printer),
         Verb::Train(args) => args.run(library, printer),

@@ -10,6 +10,7 @@ fn help_and_version_succeed() {
     for verb in [
         "info",
         "import",
+        "edit",
         "retarget",
         "tracks",
         "train",

@@ -1,0 +1,23 @@
+//! Moves over the ground.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
+
+/// The move over the ground, a turn about Z and a horizontal shift, that brings `a` nearest to `b` in the least-squares
+/// sense (planar Procrustes).
+pub(crate) fn carry(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Isometry3<f64> {
+    let (from, to) = (centre(a), centre(b));
+    let (mut cross, mut dot) = (0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        let (a, b) = (a.xy() - from, b.xy() - to);
+        cross += a.perp(&b);
+        dot += a.dot(&b);
+    }
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), f64::atan2(cross, dot));
+    let shift = to.push(0.0) - turn * from.push(0.0);
+    Isometry3::from_parts(shift.into(), turn)
+}
+
+fn centre(places: &[Vector3<f64>]) -> Vector2<f64> {
+    let sum: Vector2<f64> = places.iter().map(|p| p.xy()).sum();
+    sum / places.len().max(1) as f64
+}

@@ -1,0 +1,282 @@
+//! The best cycle of a long take.
+
+use super::at_least;
+use super::figure::{Figure, moving};
+use super::look::{Look, landmarks};
+use super::seam::{Seam, Side, carry_all};
+use crate::clip::{Clip, Error, LoopMode, Problem, Severity};
+use nalgebra::Isometry3;
+
+/// Pairs of frames that are compared in the first, coarse search.
+const PAIRS: usize = 12_000_000;
+/// Most frames that take part in it.
+const MOST_LOOKS: usize = 40_000;
+/// Longest step between them, s, where their number allows it: poses are alike for about as long.
+const COARSE: f64 = 0.1;
+/// Lengths that are looked at more closely.
+const CANDIDATES: usize = 32;
+/// A shorter cycle is as good as the best if its gap is no wider by more than this part of the motion.
+const TIE: f64 = 0.02;
+/// Pose change, relative to the figure's size, below which nothing happens that could repeat.
+const STILL: f64 = 0.002;
+/// Gap, relative to the motion, that is told of.
+const NOTICEABLE: f64 = 0.25;
+/// A cycle that turns less than this goes straight, radians (1°).
+const STRAIGHT: f64 = 0.0175;
+/// Time on either side of the seam over which its gap is spread, s, and the part of the cycle that this is at most.
+const SPREAD: f64 = 0.25;
+const SHARE: f64 = 0.25;
+
+/// A part of a clip that comes back to where it starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loop {
+    /// First frame.
+    pub start: usize,
+    /// Last frame: the first one of the next cycle.
+    pub end: usize,
+    /// How much pose and velocity differ between both, as a part of how much they change on the way.
+    pub gap: f64,
+}
+
+impl Clip {
+    /// The part of the clip, `shortest` seconds or longer, whose end is most like its start: in pose and velocity,
+    /// whatever the place on the ground and the heading. Of about equally good ones the shortest is chosen.
+    ///
+    /// All lengths are tried in clips up to about a quarter of an hour. In longer ones they are limited, so that the time
+    /// this takes is: to about half a minute in an hour.
+    ///
+    /// # Errors
+    /// A clip that is too short, or that stands still.
+    pub fn find_loop(&self, shortest: f64) -> Result<Loop, Error> {
+        self.check()?;
+        let shortest = at_least("a shortest cycle", shortest, 0.0, "seconds from 0 up")?;
+        let search = Search::new(self);
+        let candidates = search.coarse(shortest);
+        let fine: Vec<Loop> = candidates
+            .iter()
+            .filter_map(|candidate| search.refine(candidate, shortest))
+            .collect();
+        let best = fine
+            .iter()
+            .map(|found| found.gap)
+            .fold(f64::INFINITY, f64::min);
+        let ties = fine.into_iter().filter(|found| found.gap <= best + TIE);
+        ties.min_by_key(|found| (found.end - found.start, found.start))
+            .ok_or_else(|| {
+                let duration = self.duration();
+                let reason = if duration < shortest {
+                    "it is shorter than that; allow shorter ones"
+                } else {
+                    "nothing moves and comes back; choose another part"
+                };
+                Error::NoCycle {
+                    shortest,
+                    duration,
+                    reason,
+                }
+            })
+    }
+
+    /// The best loop of at least `shortest` seconds, cut out and closed.
+    ///
+    /// # Errors
+    /// As for [`Clip::find_loop`].
+    pub fn cut_loop(&self, shortest: f64) -> Result<Clip, Error> {
+        let found = self.find_loop(shortest)?;
+        self.closed(&found)
+    }
+
+    /// A part of the clip as a loop that runs on without a jump in pose or velocity: what its end and start differ by,
+    /// apart from the way over the ground, is spread over the frames around the seam.
+    ///
+    /// # Errors
+    /// A loop that isn't of this clip.
+    pub fn closed(&self, part: &Loop) -> Result<Clip, Error> {
+        self.check()?;
+        let (start, end) = (part.start, part.end);
+        if start >= end || end >= self.frames.len() {
+            let seconds = |frame: usize| frame as f64 / self.fps;
+            return Err(Error::EmptyTrim {
+                from: seconds(start),
+                to: seconds(end),
+                duration: self.duration(),
+            });
+        }
+        let figure = Figure::new(&self.joints, &moving(self));
+        let carry = figure.carry_straight(&self.world(start), &self.world(end), STRAIGHT);
+        let mut frames = self.frames[start..=end].to_vec();
+        self.close(&figure, &carry, start, &mut frames);
+        let mut clip = self.with_frames(frames, self.fps, LoopMode::Wrap);
+        clip.problems.extend(gap_problem(part));
+        Ok(clip)
+    }
+
+    /// Bends both ends of `frames`, which start at `start`, until the last is the first, moved on.
+    fn close(
+        &self,
+        figure: &Figure,
+        carry: &Isometry3<f64>,
+        start: usize,
+        frames: &mut [Vec<Isometry3<f64>>],
+    ) {
+        let last = frames.len() - 1;
+        let window = (SPREAD * self.fps).min(SHARE * last as f64).round() as usize;
+        let window = window.clamp(1, last.div_ceil(2));
+        // Velocities come from frames on both sides, where the take has them.
+        let (next, at) = self.around(start, 2 * window);
+        let mut next = next.to_vec();
+        carry_all(self, figure, carry, &mut next);
+        let (poses, end) = self.around(start + last, 2 * window);
+        let seam = Seam::between(Side { poses, at: end }, Side { poses: &next, at });
+        let loops_already = self.loop_mode == LoopMode::Wrap && frames.len() == self.frames.len();
+        let seam = if loops_already { seam.of_poses() } else { seam };
+        seam.bend_end(frames, window);
+        let coming = &mut next[at..];
+        seam.bend_start(coming, window);
+        carry_all(self, figure, &carry.inverse(), coming);
+        for (frame, bent) in frames.iter_mut().zip(coming).take(window) {
+            frame.clone_from(bent);
+        }
+    }
+
+    /// The frames up to `away` from a frame, and where it is among them.
+    fn around(&self, frame: usize, away: usize) -> (&[Vec<Isometry3<f64>>], usize) {
+        let from = frame.saturating_sub(away);
+        let to = (frame + away).min(self.frames.len() - 1);
+        (&self.frames[from..=to], frame - from)
+    }
+}
+
+fn gap_problem(part: &Loop) -> Option<Problem> {
+    (part.gap > NOTICEABLE).then(|| Problem {
+        id: "loop-gap".to_owned(),
+        severity: Severity::Warning,
+        message: format!(
+            "even the best cycle doesn't close: pose and velocity at its ends differ by {:.0} % of how far they change; \
+             choose a part of the take that repeats",
+            100.0 * part.gap
+        ),
+    })
+}
+
+/// A loop between frames of the coarse search, and how far its pose changes, metres.
+struct Candidate {
+    found: Loop,
+    range: f64,
+}
+
+struct Search<'a> {
+    clip: &'a Clip,
+    landmarks: Vec<usize>,
+    /// Frames from one look to the next.
+    stride: usize,
+    looks: Vec<Look>,
+    /// Change below which nothing happens, metres.
+    still: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(clip: &'a Clip) -> Self {
+        let figure = Figure::new(&clip.joints, &moving(clip));
+        let landmarks = landmarks(clip, &figure);
+        let frames = clip.frames.len();
+        let all_pairs = frames.div_ceil((2 * PAIRS).isqrt());
+        let coarse = (COARSE * clip.fps) as usize;
+        let stride = all_pairs
+            .min(coarse)
+            .max(frames.div_ceil(MOST_LOOKS))
+            .max(1);
+        let look = |f| Look::new(clip, &landmarks, f);
+        let looks: Vec<Look> = (0..frames).step_by(stride).map(look).collect();
+        let still = STILL * size(clip, &landmarks);
+        Self {
+            clip,
+            stride,
+            looks,
+            still,
+            landmarks,
+        }
+    }
+
+    /// The best start for every length, of those lengths that are better than their neighbours.
+    fn coarse(&self, shortest: f64) -> Vec<Candidate> {
+        let step = self.stride as f64 / self.clip.fps;
+        let longest = (PAIRS / self.looks.len().max(1)).max(2 * (shortest / step) as usize);
+        let longest = longest.min(self.looks.len().saturating_sub(1));
+        let least = ((shortest / step - 1e-6).floor() as usize).max(1);
+        let mut best: Vec<Option<Candidate>> = (0..=longest).map(|_| None).collect();
+        for start in 0..self.looks.len() {
+            self.from(start, least, &mut best);
+        }
+        let gap = |length: usize| {
+            let found = best.get(length).and_then(Option::as_ref);
+            found.map_or(f64::INFINITY, |candidate| candidate.found.gap)
+        };
+        let dips = |length: &usize| {
+            gap(*length) <= gap(length.wrapping_sub(1)) && gap(*length) <= gap(length + 1)
+        };
+        let dips: Vec<usize> = (0..=longest).filter(dips).collect();
+        let mut candidates: Vec<Candidate> = dips
+            .into_iter()
+            .filter_map(|length| best[length].take())
+            .collect();
+        candidates.sort_by(|a, b| a.found.gap.total_cmp(&b.found.gap));
+        candidates.truncate(CANDIDATES);
+        candidates
+    }
+
+    /// Takes the loops that start at look `start` into the best of each length.
+    fn from(&self, start: usize, least: usize, best: &mut [Option<Candidate>]) {
+        let mut range = 0.0_f64;
+        let later = self.looks[start..].iter().zip(best).enumerate().skip(1);
+        for (length, (look, best)) in later {
+            let distance = self.looks[start].distance(look);
+            range = range.max(distance);
+            let gap = distance / range;
+            let better = best.as_ref().is_none_or(|best| gap < best.found.gap);
+            if length >= least && range > self.still && better {
+                let found = Loop {
+                    start: start * self.stride,
+                    end: (start + length) * self.stride,
+                    gap,
+                };
+                *best = Some(Candidate { found, range });
+            }
+        }
+    }
+
+    /// The best loop of at least `shortest` seconds among the frames that the coarse search left out around a candidate.
+    fn refine(&self, candidate: &Candidate, shortest: f64) -> Option<Loop> {
+        let last = self.clip.frames.len() - 1;
+        let least = ((shortest * self.clip.fps - 1e-6).ceil() as usize).max(1);
+        let around = |frame: usize| {
+            let from = frame.saturating_sub(self.stride);
+            let frames = from..=(frame + self.stride).min(last);
+            frames
+                .map(|f| (f, Look::new(self.clip, &self.landmarks, f)))
+                .collect()
+        };
+        let starts: Vec<(usize, Look)> = around(candidate.found.start);
+        let ends: Vec<(usize, Look)> = around(candidate.found.end);
+        let mut best: Option<Loop> = None;
+        for (start, from) in &starts {
+            for (end, to) in ends.iter().filter(|(end, _)| *end >= start + least) {
+                let gap = from.distance(to) / candidate.range;
+                if best.is_none_or(|best| gap < best.gap) {
+                    let (start, end) = (*start, *end);
+                    best = Some(Loop { start, end, gap });
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Greatest distance of a landmark from the first, metres.
+fn size(clip: &Clip, landmarks: &[usize]) -> f64 {
+    let world = clip.world(0);
+    let place = |j: usize| world[j].translation.vector;
+    let centre = landmarks.first().map(|&j| place(j));
+    let away = |&j: &usize| centre.map_or(0.0, |centre| (place(j) - centre).norm());
+    landmarks.iter().map(away).fold(0.0, f64::max)
+}

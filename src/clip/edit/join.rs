@@ -1,0 +1,148 @@
+//! Several clips of one figure, one after another.
+
+use super::at_least;
+use super::figure::{Figure, moving};
+use super::seam::{Seam, Side, carry_all};
+use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity};
+use std::collections::BTreeMap;
+
+/// Rest poses that differ by more, in metres or radians, are told of.
+const OTHER_REST: f64 = 0.01;
+
+impl Clip {
+    /// The clips one after another, at the rate and with the rest pose of the first. Each begins where the one before
+    /// ends: its last frame and the next one's first are the same instant, on the same place of the ground and with the
+    /// same heading. What poses and velocities differ there is spread over `blend` seconds, half before and half after,
+    /// so that both run on without a jump.
+    ///
+    /// # Errors
+    /// Clips whose joints aren't the same by name, or that are too long together; a `blend` below 0.
+    pub fn join(clips: &[Clip], blend: f64) -> Result<Clip, Error> {
+        let blend = at_least("a blend", blend, 0.0, "seconds from 0 up")?;
+        let (first, others) = clips.split_first().ok_or(Error::NoClips)?;
+        first.check()?;
+        let mut joined = first.clone();
+        let mut piece = first.frames.len();
+        for clip in others {
+            let next = first.like(clip)?;
+            first.check_room(joined.frames.len() + next.frames.len())?;
+            let length = next.frames.len();
+            joined.follow(next, piece, blend);
+            piece = length;
+            joined.loop_mode = LoopMode::Clamp;
+        }
+        Ok(joined)
+    }
+
+    /// `next` put behind this clip, whose last piece has `piece` frames.
+    fn follow(&mut self, mut next: Clip, piece: usize, blend: f64) {
+        let moves = moving(self).into_iter().zip(moving(&next));
+        let moves: Vec<bool> = moves.map(|(a, b)| a || b).collect();
+        let figure = Figure::new(&self.joints, &moves);
+        let carry = figure.carry(&next.world(0), &self.world(self.frames.len() - 1));
+        let mut coming = std::mem::take(&mut next.frames);
+        carry_all(self, &figure, &carry, &mut coming);
+        let half = |frames: usize| frames.saturating_sub(1) / 2;
+        let window = (0.5 * blend * self.fps).round() as usize;
+        let window = window.min(half(piece)).min(half(coming.len()));
+        let near = (2 * window).max(2);
+        let end = Side {
+            poses: &self.frames[self.frames.len() - piece.min(near + 1)..],
+            at: piece.min(near + 1) - 1,
+        };
+        let start = Side {
+            poses: &coming[..coming.len().min(near + 1)],
+            at: 0,
+        };
+        let seam = Seam::between(end, start);
+        seam.bend_end(&mut self.frames, window);
+        seam.bend_start(&mut coming, window);
+        self.frames.extend(coming.into_iter().skip(1));
+        self.problems.extend(next.problems);
+        self.problems.dedup();
+    }
+
+    fn check_room(&self, frames: usize) -> Result<(), Error> {
+        if frames.saturating_mul(self.joints.len()) <= MOST_TRANSFORMS {
+            return Ok(());
+        }
+        Err(Error::TooLong {
+            duration: frames as f64 / self.fps,
+            fps: self.fps,
+        })
+    }
+
+    /// `other` at this clip's rate, with its joints in this clip's order.
+    fn like(&self, other: &Clip) -> Result<Clip, Error> {
+        other.check()?;
+        let order = order(&self.joints, &other.joints).map_err(|reason| Error::OtherJoints {
+            name: other.name.clone(),
+            first: self.name.clone(),
+            reason,
+        })?;
+        let same_rate = (other.fps - self.fps).abs() <= 1e-9 * self.fps;
+        let resampled = if same_rate {
+            None
+        } else {
+            Some(other.resample(self.fps)?)
+        };
+        let other = resampled.as_ref().unwrap_or(other);
+        let ordered = |frame: &Vec<_>| order.iter().map(|&j| frame[j]).collect();
+        let frames = other.frames.iter().map(ordered).collect();
+        let mut like = self.with_frames(Vec::new(), self.fps, LoopMode::Clamp);
+        like.frames = frames;
+        like.problems = other.problems.clone();
+        like.problems.extend(other_rest(self, other, &order));
+        Ok(like)
+    }
+}
+
+/// For each joint the place of its namesake in `theirs`.
+fn order(ours: &[Joint], theirs: &[Joint]) -> Result<Vec<usize>, String> {
+    let same = |(a, b): (&Joint, &Joint)| a.name == b.name && a.parent == b.parent;
+    if ours.len() == theirs.len() && ours.iter().zip(theirs).all(same) {
+        return Ok((0..ours.len()).collect());
+    }
+    let (here, there) = (named(ours)?, named(theirs)?);
+    if let Some(extra) = there.keys().find(|name| !here.contains_key(*name)) {
+        return Err(format!("it has a joint `{extra}` of its own"));
+    }
+    let find = |joint: &Joint| match there.get(joint.name.as_str()) {
+        Some(&found) if parent(theirs, found) == joint.parent.map(|p| &*ours[p].name) => Ok(found),
+        Some(_) => Err(format!("its joint `{}` has another parent", joint.name)),
+        None => Err(format!("it has no joint `{}`", joint.name)),
+    };
+    ours.iter().map(find).collect()
+}
+
+fn parent(joints: &[Joint], joint: usize) -> Option<&str> {
+    joints[joint].parent.map(|p| &*joints[p].name)
+}
+
+fn named(joints: &[Joint]) -> Result<BTreeMap<&str, usize>, String> {
+    let mut named = BTreeMap::new();
+    for (j, joint) in joints.iter().enumerate() {
+        if named.insert(joint.name.as_str(), j).is_some() {
+            return Err(format!("several joints are called `{}`", joint.name));
+        }
+    }
+    Ok(named)
+}
+
+fn other_rest(ours: &Clip, theirs: &Clip, order: &[usize]) -> Option<Problem> {
+    let differs = |(joint, other): &(&Joint, &usize)| {
+        let (a, b) = (&joint.rest, &theirs.joints[**other].rest);
+        (a.translation.vector - b.translation.vector).norm() > OTHER_REST
+            || a.rotation.angle_to(&b.rotation) > OTHER_REST
+    };
+    let (joint, _) = ours.joints.iter().zip(order).find(differs)?;
+    Some(Problem {
+        id: "other-rest".to_owned(),
+        severity: Severity::Warning,
+        message: format!(
+            "joint `{}` rests differently in `{}` and `{}`: they may be figures of different size; the rest pose of the \
+             first is kept",
+            joint.name, ours.name, theirs.name
+        ),
+    })
+}

@@ -1,0 +1,67 @@
+//! Edits: every one takes a clip and gives another.
+//!
+//! Where several are wanted, this order keeps the meaning of their numbers: trim, mirror, join, cut the best loop, warp
+//! time, take travel out, put travel in, resample. Seconds of a trim are then those of the source, and speeds of travel
+//! those of the result.
+
+mod cycle;
+mod figure;
+mod join;
+mod look;
+mod mirror;
+mod seam;
+#[cfg(test)]
+mod tests;
+mod travel;
+mod warp;
+
+pub use cycle::Loop;
+pub use mirror::Plane;
+
+use super::sampling::MOST_FPS;
+use super::{Clip, Error};
+
+impl Clip {
+    /// What every edit relies on, and a clip that was made by hand may lack.
+    fn check(&self) -> Result<(), Error> {
+        let unusable = |reason: &str| {
+            Err(Error::Unusable {
+                name: self.name.clone(),
+                reason: reason.to_owned(),
+            })
+        };
+        let count = self.joints.len();
+        let mut joints = self.joints.iter().enumerate();
+        if self.frames.is_empty() || count == 0 {
+            return unusable("it has no frames or no joints");
+        }
+        if !self.frames.iter().all(|frame| frame.len() == count) {
+            return unusable("a frame has more or fewer joints than the clip");
+        }
+        if !joints.all(|(j, joint)| joint.parent.is_none_or(|p| p < j)) {
+            return unusable("a joint stands before its parent");
+        }
+        if !(self.fps > 0.0 && self.fps <= MOST_FPS) {
+            return unusable("its frame rate is none");
+        }
+        Ok(())
+    }
+}
+
+/// `value` where it is a number from `least` up.
+fn at_least(
+    what: &'static str,
+    value: f64,
+    least: f64,
+    wanted: &'static str,
+) -> Result<f64, Error> {
+    if value.is_finite() && value >= least {
+        Ok(value)
+    } else {
+        Err(Error::Number {
+            what,
+            value,
+            wanted,
+        })
+    }
+}

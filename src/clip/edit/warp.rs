@@ -1,0 +1,94 @@
+//! The same motion in another time.
+
+use super::at_least;
+use crate::clip::{Clip, Error};
+
+/// Longest time that is looked at, s: more can't be sampled anyhow.
+const LONGEST: f64 = 1e9;
+
+impl Clip {
+    /// The clip `factor` times as fast, sampled at `fps`.
+    ///
+    /// # Errors
+    /// A factor that isn't positive, a rate that can't be sampled, or more frames than a clip may have.
+    pub fn speed(&self, factor: f64, fps: f64) -> Result<Clip, Error> {
+        self.check()?;
+        let factor = at_least("a speed", factor, 1e-6, "a factor from 0.000001 up")?;
+        let duration = self.duration();
+        if duration == 0.0 {
+            return self.resample(fps);
+        }
+        self.warp(&[(duration, duration / factor)], fps)
+    }
+
+    /// The clip in another time, sampled at `fps`: what is at second `a` comes to second `b` for each of `points`
+    /// (a, b), and the start stays at 0. Between them time runs along a monotone cubic curve without jumps in speed
+    /// (Fritsch and Butland, 1984); after the last it runs as before.
+    ///
+    /// # Errors
+    /// Points that don't rise, or that lie beyond the clip's end.
+    pub fn warp(&self, points: &[(f64, f64)], fps: f64) -> Result<Clip, Error> {
+        self.check()?;
+        let knots = knots(points, self.duration())?;
+        let end = knots.last().map_or(0.0, |knot| knot.0);
+        let grid = self.grid(end, fps)?;
+        let slopes = slopes(&knots);
+        let frames = (0..grid.frames).map(|f| self.sample(source(&knots, &slopes, grid.time(f))));
+        Ok(self.with_frames(frames.collect(), grid.fps, self.loop_mode))
+    }
+}
+
+/// Pairs of new time and source time, both rising from 0 to the end.
+fn knots(points: &[(f64, f64)], duration: f64) -> Result<Vec<(f64, f64)>, Error> {
+    let mut knots = vec![(0.0, 0.0)];
+    let points = points.iter().skip_while(|point| **point == (0.0, 0.0));
+    for &(from, to) in points {
+        let before = knots[knots.len() - 1];
+        // The end of a clip is typed with fewer digits than it has.
+        let from = if from > duration && from <= duration + 1e-3 {
+            duration
+        } else {
+            from
+        };
+        if !(to > before.0 && from > before.1 && from <= duration && to <= LONGEST) {
+            return Err(Error::Warp { from, to, duration });
+        }
+        knots.push((to, from));
+    }
+    let (to, from) = knots[knots.len() - 1];
+    if from < duration {
+        knots.push((to + duration - from, duration));
+    }
+    Ok(knots)
+}
+
+/// Slope of the curve at each knot: the harmonic mean of its neighbours' secants, weighted by their lengths.
+fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
+    let secant = |k: usize| (knots[k + 1].1 - knots[k].1) / (knots[k + 1].0 - knots[k].0);
+    let last = knots.len() - 1;
+    let slope = |k: usize| match k {
+        _ if last == 0 => 1.0,
+        0 => secant(0),
+        _ if k == last => secant(last - 1),
+        _ => {
+            let (a, b) = (secant(k - 1), secant(k));
+            let part = (knots[k + 1].0 - knots[k].0) / (knots[k + 1].0 - knots[k - 1].0);
+            let share = (1.0 + part) / 3.0;
+            a * b / (share * b + (1.0 - share) * a)
+        }
+    };
+    (0..=last).map(slope).collect()
+}
+
+/// Source time of a new time.
+fn source(knots: &[(f64, f64)], slopes: &[f64], time: f64) -> f64 {
+    let above = knots.partition_point(|knot| knot.0 <= time);
+    let (Some(&(t1, s1)), Some(k)) = (knots.get(above), above.checked_sub(1)) else {
+        return knots.last().map_or(0.0, |knot| knot.1);
+    };
+    let (t0, s0) = knots[k];
+    let (long, x) = (t1 - t0, (time - t0) / (t1 - t0));
+    let (rise, start, end) = (s1 - s0, slopes[k] * long, slopes[above] * long);
+    let (x2, x3) = (x * x, x * x * x);
+    s0 + rise * (3.0 * x2 - 2.0 * x3) + start * (x3 - 2.0 * x2 + x) + end * (x3 - x2)
+}
