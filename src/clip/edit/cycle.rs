@@ -3,7 +3,7 @@
 use super::at_least;
 use super::figure::{Figure, moving};
 use super::look::{Look, landmarks};
-use super::seam::{Seam, Side, carry_all};
+use super::seam::{Seam, Side, carry_all, near};
 use crate::clip::{Clip, Error, LoopMode, Problem, Severity};
 use nalgebra::Isometry3;
 
@@ -123,10 +123,10 @@ impl Clip {
         let window = (SPREAD * self.fps).min(SHARE * last as f64).round() as usize;
         let window = window.clamp(1, last.div_ceil(2));
         // Velocities come from frames on both sides, where the take has them.
-        let (next, at) = self.around(start, 2 * window);
+        let (next, at) = self.around(start);
         let mut next = next.to_vec();
         carry_all(self, figure, carry, &mut next);
-        let (poses, end) = self.around(start + last, 2 * window);
+        let (poses, end) = self.around(start + last);
         let seam = Seam::between(Side { poses, at: end }, Side { poses: &next, at });
         let loops_already = self.loop_mode == LoopMode::Wrap && frames.len() == self.frames.len();
         let seam = if loops_already { seam.of_poses() } else { seam };
@@ -139,8 +139,9 @@ impl Clip {
         }
     }
 
-    /// The frames up to `away` from a frame, and where it is among them.
-    fn around(&self, frame: usize, away: usize) -> (&[Vec<Isometry3<f64>>], usize) {
+    /// The frames around a frame, and where it is among them.
+    fn around(&self, frame: usize) -> (&[Vec<Isometry3<f64>>], usize) {
+        let away = near(self);
         let from = frame.saturating_sub(away);
         let to = (frame + away).min(self.frames.len() - 1);
         (&self.frames[from..=to], frame - from)

@@ -2,7 +2,7 @@
 
 use super::at_least;
 use super::figure::{Figure, moving};
-use super::seam::{Seam, Side, carry_all};
+use super::seam::{Seam, Side, carry_all, near};
 use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity};
 use std::collections::BTreeMap;
 
@@ -23,11 +23,16 @@ impl Clip {
         first.check()?;
         let mut joined = first.clone();
         let mut piece = first.frames.len();
+        let mut moves = moving(first);
         for clip in others {
             let next = first.like(clip)?;
             first.check_room(joined.frames.len() + next.frames.len())?;
             let length = next.frames.len();
-            joined.follow(next, piece, blend);
+            for (moves, next) in moves.iter_mut().zip(moving(&next)) {
+                *moves |= next;
+            }
+            let figure = Figure::new(&first.joints, &moves);
+            joined.follow(next, &figure, piece, blend);
             piece = length;
             joined.loop_mode = LoopMode::Clamp;
         }
@@ -35,17 +40,14 @@ impl Clip {
     }
 
     /// `next` put behind this clip, whose last piece has `piece` frames.
-    fn follow(&mut self, mut next: Clip, piece: usize, blend: f64) {
-        let moves = moving(self).into_iter().zip(moving(&next));
-        let moves: Vec<bool> = moves.map(|(a, b)| a || b).collect();
-        let figure = Figure::new(&self.joints, &moves);
+    fn follow(&mut self, mut next: Clip, figure: &Figure, piece: usize, blend: f64) {
         let carry = figure.carry(&next.world(0), &self.world(self.frames.len() - 1));
         let mut coming = std::mem::take(&mut next.frames);
-        carry_all(self, &figure, &carry, &mut coming);
+        carry_all(self, figure, &carry, &mut coming);
         let half = |frames: usize| frames.saturating_sub(1) / 2;
         let window = (0.5 * blend * self.fps).round() as usize;
         let window = window.min(half(piece)).min(half(coming.len()));
-        let near = (2 * window).max(2);
+        let near = near(self);
         let end = Side {
             poses: &self.frames[self.frames.len() - piece.min(near + 1)..],
             at: piece.min(near + 1) - 1,

@@ -6,6 +6,16 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 
 type Pose = Vec<Isometry3<f64>>;
 
+/// How far from a seam it is looked for what is usual there, s.
+const NEAR: f64 = 1.0;
+/// Velocity may change at a seam by so many times what it does from frame to frame around it: a foot that lands stops.
+const USUAL: f64 = 1.5;
+
+/// Frames of `clip` that are looked at on either side of a seam.
+pub(super) fn near(clip: &Clip) -> usize {
+    ((NEAR * clip.fps).ceil() as usize).max(2)
+}
+
 /// A joint's shift in its parent's axes and its turn in its own, as a rotation vector.
 type Step = Vector6<f64>;
 
@@ -85,8 +95,8 @@ impl Side<'_> {
         let shifting = after.fixed_rows::<3>(0) - before.fixed_rows::<3>(0);
         let turning = half * after.fixed_rows::<3>(3) - half.inverse() * before.fixed_rows::<3>(3);
         let (here, there) = (bends(self.poses, j), bends(start.poses, j));
-        let shifting = excess(shifting, here.0.max(there.0));
-        let turning = excess(turning, here.1.max(there.1));
+        let shifting = excess(shifting, USUAL * here.0.max(there.0));
+        let turning = excess(turning, USUAL * here.1.max(there.1));
         let mut rate = Step::zeros();
         rate.fixed_rows_mut::<3>(0).copy_from(&shifting);
         rate.fixed_rows_mut::<3>(3).copy_from(&turning);
@@ -98,8 +108,7 @@ impl Side<'_> {
 pub(super) struct Seam(Vec<Gap>);
 
 impl Seam {
-    /// Between the side that ends and the side that starts. Velocities may change as much as they do from frame to frame
-    /// on either side: a foot that lands stops.
+    /// Between the side that ends and the side that starts.
     pub fn between(end: Side, start: Side) -> Self {
         let joints = 0..end.poses[end.at].len();
         Self(joints.map(|j| end.gap(&start, j)).collect())

@@ -1,5 +1,6 @@
 mod odd;
 mod rigs;
+mod sides;
 
 use super::*;
 use nalgebra::{Isometry3, Vector3};
