@@ -102,16 +102,18 @@ impl Clip {
         if t > 1.0 - 1e-9 || frame == last {
             return self.frames[(frame + 1).min(last)].clone();
         }
-        (0..a.len()).map(|j| self.between(frame, t, j)).collect()
+        let around = &self.frames[frame.saturating_sub(1)..(frame + 3).min(last + 1)];
+        let joints = around.iter().map(Vec::len).min().unwrap_or(0);
+        (0..joints).map(|j| self.between(frame, t, j)).collect()
     }
 
     /// Transform of joint `j` a fraction `t` of the way from frame `frame` to the next.
     fn between(&self, frame: usize, t: f64, j: usize) -> Isometry3<f64> {
+        let (a, b) = (&self.frames[frame][j], &self.frames[frame + 1][j]);
         let at = |f: usize| self.frames[f][j].translation.vector;
         let before = frame.checked_sub(1).map(|f| at(frame) - at(f));
         let after = (frame + 2 < self.frames.len()).then(|| at(frame + 2) - at(frame + 1));
         let way = way(before, at(frame + 1) - at(frame), after, t);
-        let (a, b) = (&self.frames[frame][j], &self.frames[frame + 1][j]);
         Isometry3::from_parts(
             Translation3::from(a.translation.vector + way),
             slerp(&a.rotation, &b.rotation, t),
@@ -121,12 +123,14 @@ impl Clip {
     /// The same clip at another rate: the first and last frames stay, so the rate is the nearest to `fps` that
     /// fits a whole number of frames between them.
     pub fn resample(&self, fps: f64) -> Result<Clip, Error> {
+        self.check()?;
         let grid = self.grid(self.duration(), fps)?;
         Ok(self.sampled(0.0, grid, self.loop_mode))
     }
 
     /// The part from `from` to `to` seconds. It ends where it is cut; only the whole keeps its loop.
     pub fn trim(&self, from: f64, to: f64) -> Result<Clip, Error> {
+        self.check()?;
         let duration = self.duration();
         let end = to.min(duration);
         let start = from.max(0.0);

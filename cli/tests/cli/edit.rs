@@ -123,7 +123,8 @@ fn three_walks_become_one_cycle() {
 #[test]
 fn a_mirror_is_a_mirror() {
     let bench = with_ours();
-    let bytes = |file: &str| tensors(&std::fs::read(bench.path(file)).expect("the clip is there"));
+    let bytes =
+        |file: &str| rotations(&std::fs::read(bench.path(file)).expect("the clip is there"));
     bench.json(&["import", "kick", "--mirror", "--out", "left.clip"]);
     bench.json(&["edit", "kick", "--mirror", "--out", "edited.clip"]);
     let apart = |a: &str, b: &str| {
@@ -149,8 +150,8 @@ fn a_mirror_is_a_mirror() {
         .code(2);
 }
 
-/// The places of all frames.
-fn tensors(file: &[u8]) -> Vec<f32> {
+/// The rotations of all frames.
+fn rotations(file: &[u8]) -> Vec<f32> {
     let (length, rest) = file.split_at(8);
     let length = u64::from_le_bytes(length.try_into().expect("eight bytes")) as usize;
     let header: Value = serde_json::from_slice(&rest[..length]).expect("a header");

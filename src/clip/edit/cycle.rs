@@ -8,11 +8,13 @@ use crate::clip::{Clip, Error, LoopMode, Problem, Severity};
 use nalgebra::Isometry3;
 
 /// Pairs of frames that are compared in the first, coarse search.
-const PAIRS: usize = 12_000_000;
+const PAIRS: usize = 48_000_000;
 /// Most frames that take part in it.
 const MOST_LOOKS: usize = 40_000;
 /// Longest step between them, s, where their number allows it: poses are alike for about as long.
 const COARSE: f64 = 0.1;
+/// Poses between the ends of a loop that show how far it moves.
+const BETWEEN: usize = 64;
 /// Lengths that are looked at more closely.
 const CANDIDATES: usize = 32;
 /// A shorter cycle is as good as the best if its gap is no wider by more than this part of the motion.
@@ -42,8 +44,8 @@ impl Clip {
     /// The part of the clip, `shortest` seconds or longer, whose end is most like its start: in pose and velocity,
     /// whatever the place on the ground and the heading. Of about equally good ones the shortest is chosen.
     ///
-    /// All lengths are tried in clips up to about a quarter of an hour. In longer ones they are limited, so that the time
-    /// this takes is: to about half a minute in an hour.
+    /// All lengths are tried in clips up to about a quarter of an hour. In longer ones only those from the shortest to
+    /// some more are, two minutes more in an hour, so that the work doesn't grow with the square of the clip.
     ///
     /// # Errors
     /// A clip that is too short, or that stands still.
@@ -107,7 +109,7 @@ impl Clip {
         let mut frames = self.frames[start..=end].to_vec();
         self.close(&figure, &carry, start, &mut frames);
         let mut clip = self.with_frames(frames, self.fps, LoopMode::Wrap);
-        clip.problems.extend(gap_problem(part));
+        clip.tell(gap_problem(part));
         Ok(clip)
     }
 
@@ -202,9 +204,9 @@ impl<'a> Search<'a> {
     /// The best start for every length, of those lengths that are better than their neighbours.
     fn coarse(&self, shortest: f64) -> Vec<Candidate> {
         let step = self.stride as f64 / self.clip.fps;
-        let longest = (PAIRS / self.looks.len().max(1)).max(2 * (shortest / step) as usize);
-        let longest = longest.min(self.looks.len().saturating_sub(1));
-        let least = ((shortest / step - 1e-6).floor() as usize).max(1);
+        let most = self.looks.len().saturating_sub(1);
+        let least = ((shortest / step - 1e-6) as usize).clamp(1, most.max(1));
+        let longest = (least + PAIRS / self.looks.len().max(1)).min(most);
         let mut best: Vec<Option<Candidate>> = (0..=longest).map(|_| None).collect();
         for start in 0..self.looks.len() {
             self.from(start, least, &mut best);
@@ -229,8 +231,12 @@ impl<'a> Search<'a> {
     /// Takes the loops that start at look `start` into the best of each length.
     fn from(&self, start: usize, least: usize, best: &mut [Option<Candidate>]) {
         let mut range = 0.0_f64;
-        let later = self.looks[start..].iter().zip(best).enumerate().skip(1);
-        for (length, (look, best)) in later {
+        let between = (1..least).step_by((least / BETWEEN).max(1));
+        for length in between.chain(least..best.len()) {
+            let Some(look) = self.looks.get(start + length) else {
+                break;
+            };
+            let best = &mut best[length];
             let distance = self.looks[start].distance(look);
             range = range.max(distance);
             let gap = distance / range;
@@ -261,7 +267,10 @@ impl<'a> Search<'a> {
         let ends: Vec<(usize, Look)> = around(candidate.found.end);
         let mut best: Option<Loop> = None;
         for (start, from) in &starts {
-            for (end, to) in ends.iter().filter(|(end, _)| *end >= start + least) {
+            for (end, to) in ends
+                .iter()
+                .filter(|(end, _)| end.saturating_sub(*start) >= least)
+            {
                 let gap = from.distance(to) / candidate.range;
                 if best.is_none_or(|best| gap < best.gap) {
                     let (start, end) = (*start, *end);

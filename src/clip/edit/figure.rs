@@ -133,15 +133,15 @@ fn carriers(joints: &[Joint], moving: &[bool]) -> Vec<usize> {
 
 /// The first joint from `top` down with several children.
 fn fork(joints: &[Joint], top: usize) -> Option<usize> {
-    let mut at = top;
-    loop {
-        let mut children = (at + 1..joints.len()).filter(|&j| joints[j].parent == Some(at));
-        let only = children.next()?;
-        if children.next().is_some() {
-            return Some(at);
+    let mut children = vec![0; joints.len()];
+    let mut child = vec![None; joints.len()];
+    for (j, joint) in joints.iter().enumerate() {
+        if let Some(parent) = joint.parent {
+            children[parent] += 1;
+            child[parent] = Some(j);
         }
-        at = only;
     }
+    std::iter::successors(Some(top), |&j| child[j]).find(|&j| children[j] > 1)
 }
 
 fn subtree(joints: &[Joint], top: usize) -> Vec<usize> {

@@ -60,8 +60,7 @@ impl Clip {
         seam.bend_end(&mut self.frames, window);
         seam.bend_start(&mut coming, window);
         self.frames.extend(coming.into_iter().skip(1));
-        self.problems.extend(next.problems);
-        self.problems.dedup();
+        self.tell(next.problems);
     }
 
     fn check_room(&self, frames: usize) -> Result<(), Error> {

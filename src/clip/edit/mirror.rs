@@ -159,8 +159,7 @@ impl Clip {
         let frames = self.frames.iter();
         let frames = frames.map(|frame| self.mirrored(frame, &rest, &partners, plane));
         let mut clip = self.with_frames(frames.collect(), self.fps, self.loop_mode);
-        clip.problems.extend(self.asymmetry(pairs, plane));
-        clip.problems.dedup();
+        clip.tell(self.asymmetry(pairs, plane));
         Ok(clip)
     }
 

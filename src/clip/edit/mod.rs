@@ -19,11 +19,11 @@ pub use cycle::Loop;
 pub use mirror::Plane;
 
 use super::sampling::MOST_FPS;
-use super::{Clip, Error};
+use super::{Clip, Error, Problem};
 
 impl Clip {
     /// What every edit relies on, and a clip that was made by hand may lack.
-    fn check(&self) -> Result<(), Error> {
+    pub(super) fn check(&self) -> Result<(), Error> {
         let unusable = |reason: &str| {
             Err(Error::Unusable {
                 name: self.name.clone(),
@@ -45,6 +45,15 @@ impl Clip {
             return unusable("its frame rate is none");
         }
         Ok(())
+    }
+
+    /// Adds the problems that aren't known yet.
+    fn tell(&mut self, problems: impl IntoIterator<Item = Problem>) {
+        for problem in problems {
+            if !self.problems.contains(&problem) {
+                self.problems.push(problem);
+            }
+        }
     }
 }
 

@@ -137,6 +137,10 @@ fn no_clip_brings_an_edit_down() {
     assert!(walk.speed(1e-6, 30.0).is_err(), "too long");
     assert!(walk.travel([f64::NAN, 0.0].into()).is_err());
     assert!(walk.cut_loop(f64::NAN).is_err() && walk.cut_loop(9.0).is_err());
+    assert!(walk.cut_loop(1e300).is_err() && walk.cut_loop(-1.0).is_err());
+    let all = walk.cut_loop(0.0).expect("any length will do");
+    assert!(all.frames.len() > 2);
+    assert!(Clip::join(&[walk.clone(), walk.clone()], 1e300).is_ok());
     assert!(Clip::join(&[walk.clone(), walk.clone()], f64::NAN).is_err());
     assert!(Clip::join(&[], 0.2).is_err());
     assert!(walk.warp(&[(0.5, f64::NAN)], 30.0).is_err());
