@@ -13,8 +13,8 @@ use mimic::import;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
-Edits are made in the order in which they are listed above, whatever the order on the line. With several
-clips, each is trimmed and mirrored, then they are joined, and the rest is done to the whole.
+Edits are made in the order in which they stand above, whatever the order on the line: each clip is
+trimmed and mirrored, then they are joined, and the rest is done to the whole.
 
 Examples:
   mimic edit kick.clip --mirror                     the other leg: writes kick-edited.clip

@@ -208,6 +208,24 @@ fn the_mirror_stands_where_the_rest_pose_is_symmetric() {
 }
 
 #[test]
+fn a_rest_pose_that_is_not_symmetric_is_told_of() {
+    let mut walk = ours("walk.glb");
+    let thigh = walk
+        .joints
+        .iter()
+        .position(|joint| joint.name == "LeftUpLeg");
+    walk.joints[thigh.expect("a thigh")].rest.rotation *= about(Vector3::x(), 0.5);
+    let other = mirrored(&walk);
+    let told = other.problems.iter().filter(|p| p.id == "asymmetric-rest");
+    assert_eq!(told.count(), 1);
+    assert_eq!(
+        other.loop_mode,
+        LoopMode::Wrap,
+        "its mirror image loops too"
+    );
+}
+
+#[test]
 fn pairs_that_do_not_fit_are_refused() {
     let walk = ours("walk.glb");
     let plane = Plane::sagittal(&walk.joints, &[]);
