@@ -209,6 +209,7 @@ fn learning_rate_follows_the_divergence() {
     };
     let config = Config {
         minibatch: 50,
+        epochs: 4,
         ..Config::default()
     };
     let slow = Config {
