@@ -75,7 +75,7 @@ pub enum Verb {
 #[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Import options")]
 pub struct ImportArgs {
-    /// Take to read, by name or by number from 1 [default: the one with most motion]
+    /// Take to read, by name or by number from 1; `mimic import` has `all` as well [default: the one with most motion]
     #[arg(long, value_name = "TAKE")]
     take: Option<String>,
     /// Frames per second to sample at [default: the take's own]

@@ -1,5 +1,6 @@
 //! A motion's checks as lines of text.
 
+use mimic::clip::Severity;
 use mimic::motion::Check;
 use std::fmt::Write;
 
@@ -7,9 +8,14 @@ use std::fmt::Write;
 pub fn table(checks: &[Check]) -> String {
     let mut text = String::new();
     for check in checks {
-        let verdict = if check.passed { "good" } else { "look" };
+        let verdict = match (check.passed, check.severity) {
+            (true, _) => "good",
+            (false, Severity::Note) => "note",
+            (false, Severity::Warning) => "warn",
+            (false, Severity::Error) => "bad",
+        };
         let (id, name) = (check.id, check.name);
-        writeln!(text, "{verdict}  {id:22} {:>16}  {name}", amounts(check)).ok();
+        writeln!(text, "{verdict:4}  {id:22} {:24}  {name}", amounts(check)).ok();
     }
     text + &advice(checks)
 }
@@ -38,6 +44,7 @@ fn amounts(check: &Check) -> String {
         let text = format!("{value:.3}");
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     };
-    let amounts = format!("{} of {}", short(check.value), short(check.limit));
-    format!("{amounts} {}", check.unit).trim_end().to_owned()
+    let unit = format!(" {}", check.unit);
+    let value = format!("{}{}", short(check.value), unit.trim_end());
+    format!("{value}, limit {}", short(check.limit))
 }

@@ -6,13 +6,17 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// Files that lead to a motion, the finished first.
-pub const ANIMATIONS: [&str; 9] = [
-    "motion", "clip", "fbx", "glb", "gltf", "bvh", "amc", "txt", "json",
+pub const ANIMATIONS: [&str; 11] = [
+    "motion", "clip", "fbx", "glb", "gltf", "vrm", "vrma", "bvh", "amc", "txt", "json",
 ];
 /// The same without finished motions.
-pub const CLIPS: [&str; 8] = ["clip", "fbx", "glb", "gltf", "bvh", "amc", "txt", "json"];
+pub const CLIPS: [&str; 10] = [
+    "clip", "fbx", "glb", "gltf", "vrm", "vrma", "bvh", "amc", "txt", "json",
+];
 /// What other tools write.
-pub const SOURCES: [&str; 7] = ["fbx", "glb", "gltf", "bvh", "amc", "txt", "json"];
+pub const SOURCES: [&str; 9] = [
+    "fbx", "glb", "gltf", "vrm", "vrma", "bvh", "amc", "txt", "json",
+];
 
 /// Folder of training runs.
 pub const RUNS: &str = "runs";

@@ -17,10 +17,12 @@ pub enum Error {
         "a rate of {fps} frames per second can't be sampled; give a positive number up to 10000"
     )]
     Rate { fps: f64 },
-    #[error("trim {from}..{to} s leaves nothing of a clip of {duration} s; trim within it")]
+    #[error(
+        "nothing is left after a trim from {from} s to {to} s of a clip of {duration:.3} s; trim within it"
+    )]
     EmptyTrim { from: f64, to: f64, duration: f64 },
     #[error(
-        "{duration} s at {fps} Hz would be more than 20 million transforms; make it shorter or lower its rate"
+        "{duration:.3} s at {fps} Hz would be more than 20 million transforms; make it shorter or lower its rate"
     )]
     TooLong { duration: f64, fps: f64 },
     #[error("{what} of {value} can't be used; give {wanted}")]
@@ -32,7 +34,7 @@ pub enum Error {
     #[error("clip `{name}` can't be edited: {reason}; import it again")]
     Unusable { name: String, reason: String },
     #[error(
-        "the time-warp {from}:{to} doesn't fit; let both its times rise from 0:0 on, the first within the {duration} s of the clip"
+        "the time-warp {from}:{to} doesn't fit; let both its times rise from 0:0 on, the first within the {duration:.3} s of the clip"
     )]
     Warp { from: f64, to: f64, duration: f64 },
     #[error("a mirror can't swap joints {left} and {right} of {joints}; pair every joint once")]
@@ -49,7 +51,7 @@ pub enum Error {
         first: String,
         reason: String,
     },
-    #[error("no cycle of {shortest} s or more in {duration} s: {reason}")]
+    #[error("no cycle of {shortest} s or more in {duration:.3} s: {reason}")]
     NoCycle {
         shortest: f64,
         duration: f64,

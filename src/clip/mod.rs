@@ -60,7 +60,7 @@ pub struct Source {
     pub file: String,
     /// Lower-case hexadecimal SHA-256 of the file's bytes.
     pub sha256: String,
-    /// `fbx`, `gltf` or `deepmimic`.
+    /// `fbx`, `gltf`, `bvh`, `amc` or `deepmimic`.
     pub format: String,
     pub take: String,
     /// Frame rate that the file states, in Hz.

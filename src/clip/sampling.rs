@@ -135,7 +135,11 @@ impl Clip {
         let end = to.min(duration);
         let start = from.max(0.0);
         if !(from <= to && start <= end) {
-            return Err(Error::EmptyTrim { from, to, duration });
+            return Err(Error::EmptyTrim {
+                from,
+                to: end,
+                duration,
+            });
         }
         let whole = start <= 0.0 && end >= duration;
         let loop_mode = if whole {

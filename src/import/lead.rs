@@ -20,14 +20,14 @@ pub(super) fn is_apart(world: &[Vec<Isometry3<f64>>]) -> bool {
     let mut steps = places.windows(2).map(|w| rms(&difference(&w[0], &w[1])));
     let first = steps.next().unwrap_or(0.0);
     let longest = steps.fold(0.0, f64::max);
-    first > OF_LONGEST * longest && first > LEAST * extent(&world[0])
+    longest > 0.0 && first > OF_LONGEST * longest && first > LEAST * extent(&world[0])
 }
 
 pub(super) fn problem() -> Problem {
     Problem {
         id: "first-frame-left-out".to_owned(),
         severity: Severity::Note,
-        message: "the first frame is a pose from which the motion doesn't go on, so it was left out; keep it with `--trim 0..`"
+        message: "the first frame is a pose from which the motion doesn't go on, so it was left out; keep it with `mimic import --trim 0..`"
             .to_owned(),
     }
 }

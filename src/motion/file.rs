@@ -1,7 +1,7 @@
 //! `NAME.motion`: a safetensors file whose metadata key `mimic` holds a JSON header.
 
 use super::{Cycle, Motion, MotionError, Tracks};
-use crate::clip::LoopMode;
+use crate::clip::{LoopMode, MOST_FPS};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -184,8 +184,11 @@ fn read_header(bytes: &[u8]) -> Result<Header, String> {
             header.version
         ));
     }
-    if !(header.fps > 0.0 && header.fps.is_finite()) {
-        return Err(format!("its frame rate {} is not positive", header.fps));
+    if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
+        return Err(format!(
+            "its frame rate {} is no positive number up to {MOST_FPS}",
+            header.fps
+        ));
     }
     let cycle = &header.cycle;
     if !cycle

@@ -7,13 +7,35 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// Columns enter one by one while the gradient says that they help; a column that would turn negative leaves.
 pub(crate) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
+    active_set(a, b, 0.0, |part| {
+        let normal = part.transpose() * part;
+        Some(normal.cholesky()?.solve(&(part.transpose() * b)))
+    })
+}
+
+/// The same with ‖`even` x‖² added. (AᵀA + e²)⁻¹ Aᵀ = Aᵀ (A Aᵀ + e²)⁻¹ makes its systems as small as A has rows.
+pub(crate) fn solve_evenly(a: &DMatrix<f64>, b: &DVector<f64>, even: f64) -> DVector<f64> {
+    active_set(a, b, even, |part| {
+        let mut small = part * part.transpose();
+        (0..small.nrows()).for_each(|i| small[(i, i)] += even * even);
+        Some(part.transpose() * small.cholesky()?.solve(b))
+    })
+}
+
+/// `optimum` gives the unconstrained optimum over some columns.
+fn active_set(
+    a: &DMatrix<f64>,
+    b: &DVector<f64>,
+    even: f64,
+    optimum: impl Fn(&DMatrix<f64>) -> Option<DVector<f64>>,
+) -> DVector<f64> {
     let columns = a.ncols();
     let mut x = DVector::zeros(columns);
     let mut passive = vec![false; columns];
     let tolerance = 1e-10 * (1.0 + a.norm() * b.norm());
     // The method is finite; the bound only guards against cycling by rounding.
     for _ in 0..3 * columns {
-        let gradient = a.transpose() * (b - a * &x);
+        let gradient = a.transpose() * (b - a * &x) - &x * (even * even);
         let entering = (0..columns)
             .filter(|&j| !passive[j] && gradient[j] > tolerance)
             .max_by(|&i, &j| gradient[i].total_cmp(&gradient[j]));
@@ -21,7 +43,7 @@ pub(crate) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
             break;
         };
         passive[entering] = true;
-        let Some(next) = descend(a, b, x.clone(), &mut passive) else {
+        let Some(next) = descend(a, x.clone(), &mut passive, &optimum) else {
             break;
         };
         x = next;
@@ -33,15 +55,13 @@ pub(crate) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
 /// `None` if the passive columns have become dependent.
 fn descend(
     a: &DMatrix<f64>,
-    b: &DVector<f64>,
     mut x: DVector<f64>,
     passive: &mut [bool],
+    optimum: &impl Fn(&DMatrix<f64>) -> Option<DVector<f64>>,
 ) -> Option<DVector<f64>> {
     loop {
         let set: Vec<usize> = (0..passive.len()).filter(|&j| passive[j]).collect();
-        let reduced = a.select_columns(&set);
-        let normal = reduced.transpose() * &reduced;
-        let optimum = normal.cholesky()?.solve(&(reduced.transpose() * b));
+        let optimum = optimum(&a.select_columns(&set))?;
         let ratio = |j: usize, s: f64| if x[j] > 0.0 { x[j] / (x[j] - s) } else { 0.0 };
         let blocking = set
             .iter()
@@ -71,6 +91,15 @@ mod tests {
         let gradient = a.transpose() * (a * &x - b);
         for (x, g) in x.iter().zip(gradient.iter()) {
             assert!(*x >= 0.0 && *g >= -1e-8 && (x * g).abs() < 1e-8, "{x} {g}");
+        }
+        let even = 0.1;
+        let x = solve_evenly(a, b, even);
+        let gradient = a.transpose() * (a * &x - b) + &x * (even * even);
+        for (x, g) in x.iter().zip(gradient.iter()) {
+            assert!(
+                *x >= 0.0 && *g >= -1e-8 && (x * g).abs() < 1e-8,
+                "even: {x} {g}"
+            );
         }
     }
 

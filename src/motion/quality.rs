@@ -47,7 +47,7 @@ const KEY_POINTS: Kind = Kind {
 };
 const AGREEMENT: Kind = Kind {
     id: "contact-disagreement",
-    name: "contacts that differ from the source's, share of frames",
+    name: "contacts of feet and hands that differ from the source's, share",
     unit: "",
     limit: 0.1,
     severity: Severity::Warning,
@@ -115,7 +115,7 @@ const BALLISTIC: Kind = Kind {
     unit: "",
     limit: 0.5,
     severity: Severity::Warning,
-    advice: "the flight is no free fall: check --fps and --unit, or the source was slowed down or scaled",
+    advice: "the flight is no free fall: check --unit; if the source was slowed down, `mimic edit --speed` gives it its own time",
 };
 const TORQUE: Kind = Kind {
     id: "joint-torque",
@@ -292,7 +292,7 @@ impl Motion {
         let torques = self.joint_torques(skeleton);
         let mut strains: Vec<(usize, f64)> = torques.iter().map(of).enumerate().collect();
         strains.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let at = (strains.len().saturating_sub(1)) * 99 / 100;
+        let at = (strains.len() * 99).div_ceil(100).saturating_sub(1);
         let (frame, value) = strains.get(at).filter(|_| !limits.is_empty())?;
         Some(TORQUE.check(*value, Some(*frame)))
     }

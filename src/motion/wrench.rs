@@ -134,12 +134,7 @@ impl Support<'_> {
     pub(crate) fn loads(&self, f: usize) -> Vec<Load> {
         let rays = self.rays(f);
         let (a, b) = self.equations(f, &rays);
-        let even = DMatrix::from_diagonal_element(rays.len(), rays.len(), EVENNESS);
-        let a = DMatrix::from_fn(6 + rays.len(), rays.len(), |i, j| {
-            if i < 6 { a[(i, j)] } else { even[(i - 6, j)] }
-        });
-        let b = b.resize_vertically(6 + rays.len(), 0.0);
-        let weights = nnls::solve(&a, &b);
+        let weights = nnls::solve_evenly(&a, &b, EVENNESS);
         let bearing = rays.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
         let load = |(ray, weight): (&Load, &f64)| Load {
             force: ray.force * *weight,

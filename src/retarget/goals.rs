@@ -54,11 +54,11 @@ fn weights(slot: Slot) -> (f64, f64) {
     }
 }
 
-const ARMS: [[Slot; 3]; 2] = [
+pub(super) const ARMS: [[Slot; 3]; 2] = [
     [Slot::LeftUpperArm, Slot::LeftLowerArm, Slot::LeftHand],
     [Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand],
 ];
-const LEGS: [[Slot; 3]; 2] = [
+pub(super) const LEGS: [[Slot; 3]; 2] = [
     [Slot::LeftUpperLeg, Slot::LeftLowerLeg, Slot::LeftFoot],
     [Slot::RightUpperLeg, Slot::RightLowerLeg, Slot::RightFoot],
 ];

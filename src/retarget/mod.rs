@@ -14,6 +14,7 @@ mod model;
 mod reach;
 mod reference;
 mod report;
+mod rest;
 mod rotation;
 mod seam;
 mod solve;
@@ -24,7 +25,7 @@ mod travel;
 
 pub use report::{MappedJoint, Report, Spread};
 
-use crate::clip::{Clip, LoopMode};
+use crate::clip::{Clip, LoopMode, MOST_FPS};
 use crate::humanoid::{self, HumanoidMap, NotHumanoid, Slot};
 use crate::motion::{Cycle, Draft, Motion};
 use crate::skeleton::{JointKind, Skeleton, limits};
@@ -65,7 +66,7 @@ pub enum RetargetError {
         frame: usize,
         joint: String,
     },
-    #[error("clip `{clip}` has a frame rate of {fps} Hz; give it a positive one")]
+    #[error("clip `{clip}` has a frame rate of {fps} Hz; give it a positive one up to 10000")]
     FrameRate { clip: String, fps: f64 },
     #[error("clip `{clip}` has {found} joint transforms at frame {frame} for {expected} joints")]
     Ragged {
@@ -134,24 +135,7 @@ pub fn retarget(
         ground: cost::weight::GROUND,
     };
     let (qpos, iterations) = solve(&problem, cycle.as_ref());
-    let contact_bodies = stance::contact_bodies(&model, &goals, &anchors);
-    let mut motion = Motion::from_poses(
-        skeleton,
-        Draft {
-            name: clip.name.clone(),
-            fps: clip.fps,
-            loop_mode: if wraps {
-                LoopMode::Wrap
-            } else {
-                LoopMode::Clamp
-            },
-            cycle: cycle.unwrap_or(STILL),
-            qpos,
-            contact: Some(stance::contact(&model, &anchors, &contact_bodies)),
-            contact_bodies,
-            report: serde_json::Value::Null,
-        },
-    );
+    let mut motion = motion(&problem, cycle, clip, qpos);
     let measured = stance::measured(&model, &goals, contacts, |end, f| {
         source.is_still(end, f, clip.fps, leg)
     });
@@ -164,6 +148,31 @@ pub fn retarget(
         seconds: start.elapsed().as_secs_f64(),
         iterations,
     })
+}
+
+/// The motion of these coordinates.
+fn motion(problem: &Problem, cycle: Option<Cycle>, clip: &Clip, qpos: Vec<Vec<f64>>) -> Motion {
+    let Problem {
+        model,
+        goals,
+        anchors,
+        ..
+    } = problem;
+    let contact_bodies = stance::contact_bodies(model, goals, anchors);
+    let draft = Draft {
+        name: clip.name.clone(),
+        fps: clip.fps,
+        loop_mode: match cycle {
+            Some(_) => LoopMode::Wrap,
+            None => LoopMode::Clamp,
+        },
+        cycle: cycle.unwrap_or(STILL),
+        qpos,
+        contact: Some(stance::contact(model, anchors, &contact_bodies)),
+        contact_bodies,
+        report: serde_json::Value::Null,
+    };
+    Motion::from_poses(model.skeleton, draft)
 }
 
 /// Gives a clip on the spot the travel that its feet tell of; says so.
@@ -294,7 +303,7 @@ fn check(clip: &Clip, skeleton: &Skeleton) -> Result<(), RetargetError> {
     if clip.frames.is_empty() {
         return Err(RetargetError::Empty { clip: name() });
     }
-    if !clip.fps.is_finite() || clip.fps <= 0.0 {
+    if !(clip.fps > 0.0 && clip.fps <= MOST_FPS) {
         return Err(RetargetError::FrameRate {
             clip: name(),
             fps: clip.fps,

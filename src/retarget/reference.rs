@@ -1,19 +1,10 @@
 //! What the result is compared with: the source's joints, limb by limb in the skeleton's size.
 
+use super::goals::{ARMS, LEGS};
 use super::source::Source;
 use crate::humanoid::Slot;
 use crate::skeleton::Skeleton;
 use nalgebra::Vector3;
-
-/// Limbs: where they spring from, bend and end.
-const LEGS: [[Slot; 3]; 2] = [
-    [Slot::LeftUpperLeg, Slot::LeftLowerLeg, Slot::LeftFoot],
-    [Slot::RightUpperLeg, Slot::RightLowerLeg, Slot::RightFoot],
-];
-const ARMS: [[Slot; 3]; 2] = [
-    [Slot::LeftUpperArm, Slot::LeftLowerArm, Slot::LeftHand],
-    [Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand],
-];
 
 /// Sizes of the skeleton relative to the scaled source.
 pub(super) struct Reference {

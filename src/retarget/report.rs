@@ -53,7 +53,8 @@ pub struct Report {
     pub penetration_m: Spread,
     /// Mean height above the ground of feet and hands while the source's stand, metres.
     pub float_m: f64,
-    /// Share of the frames in which a foot or hand stands and the source's doesn't, or the other way round.
+    /// Share of the frames of every foot and hand, all taken together, in which it stands and the source's doesn't, or
+    /// the other way round.
     #[serde(default)]
     pub contact_disagreement: f64,
     /// Coordinates outside of their limits, summed over frames.
@@ -122,7 +123,7 @@ fn no_stance(contacts: &[Contact]) -> Option<Problem> {
     (!stands).then(|| Problem {
         id: "no-stance".to_owned(),
         severity: Severity::Warning,
-        message: "no foot or hand stands on the ground in any frame, so skating and floating say nothing; is the                   ground of the clip at z = 0?"
+        message: "no foot or hand stands on the ground in any frame, so skating and floating say nothing; is the ground of the clip at z = 0?"
             .to_owned(),
     })
 }

@@ -92,6 +92,9 @@ impl<'a> Solver<'a> {
     fn settle(&self, frames: &mut [Vec<f64>], window: Window, moved: &[f64]) {
         let reach = ((REACH * self.problem.fps).ceil() as usize).clamp(2, MOST_REACH);
         for part in restless(moved, reach) {
+            // Both ends of a ring that lacks one frame would be that frame.
+            let lacks_one = window.is_ring() && part.len() + 1 == window.count;
+            let part = if lacks_one { 0..window.count } else { part };
             let start = (window.start + part.start) % window.total;
             let count = part.len();
             let part = Window {

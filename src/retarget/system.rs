@@ -31,7 +31,7 @@ impl Window {
     }
 
     /// Whether every frame of a trajectory that repeats is in it, so that its end is beside its start.
-    fn is_ring(&self) -> bool {
+    pub fn is_ring(&self) -> bool {
         self.repeats && self.count == self.total
     }
 

@@ -43,7 +43,7 @@ pub(super) fn missing(
 pub(super) fn problem(velocity: &Vector3<f64>) -> Problem {
     Problem {
         id: "travel-restored".to_owned(),
-        severity: Severity::Note,
+        severity: Severity::Warning,
         message: format!(
             "the clip moves on the spot with sliding feet; travel of {:.2} m/s was added so that they stand",
             velocity.norm()

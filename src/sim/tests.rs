@@ -184,6 +184,29 @@ fn a_held_pose_stands_on_the_ground() {
 }
 
 #[test]
+fn every_built_in_character_stands_in_its_rest_pose() {
+    for (name, dof) in [("humanoid", 28), ("marathon", 21), ("robot", 23)] {
+        let skeleton = Skeleton::load(name).expect("a built-in character loads");
+        let character = Character::new(&skeleton).expect("it can be simulated");
+        assert_eq!(character.dof, dof, "{name}");
+        let mut rest = skeleton.rest_qpos();
+        rest[2] -= skeleton.lowest_point(&skeleton.forward(&rest));
+        let mut world = World::new(&character, Settings::default());
+        world.reset(&standing(&character, rest[2] as f32));
+        let hold = held(&character);
+        world.set_targets(&hold);
+        for _ in 0..15 {
+            world.step().expect("standing stays finite");
+        }
+        let root = world.states()[0].pose;
+        assert!(
+            (root.translation.z - rest[2] as f32).abs() < 0.02 && root.rotation.angle() < 0.1,
+            "{name}: {root}"
+        );
+    }
+}
+
+#[test]
 fn starting_inside_the_ground_adds_no_energy() {
     let character = humanoid();
     for depth in [0.03, 0.08] {

@@ -11,11 +11,23 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 /// Characters compiled into the library: name, MJCF, slots.
-const BUILT_IN: [(&str, &str, &str); 1] = [(
-    "humanoid",
-    include_str!("../../skeletons/humanoid.xml"),
-    include_str!("../../skeletons/humanoid.json"),
-)];
+const BUILT_IN: [(&str, &str, &str); 3] = [
+    (
+        "humanoid",
+        include_str!("../../skeletons/humanoid.xml"),
+        include_str!("../../skeletons/humanoid.json"),
+    ),
+    (
+        "marathon",
+        include_str!("../../skeletons/marathon.xml"),
+        include_str!("../../skeletons/marathon.json"),
+    ),
+    (
+        "robot",
+        include_str!("../../skeletons/robot.xml"),
+        include_str!("../../skeletons/robot.json"),
+    ),
+];
 
 impl Skeleton {
     /// Names of the built-in characters.

@@ -16,6 +16,7 @@ mod gltf;
 mod gltf_kept;
 mod gltf_made;
 mod gltf_reference;
+mod maps;
 mod robust;
 
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use crate::args::ImportArgs;
 use crate::clip_report::ClipReport;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{make_room, names_folder, result_path};
+use crate::output::{file_name, make_room, names_folder, result_path};
 use crate::printer::Printer;
 use mimic::import;
 use serde_json::json;
@@ -15,6 +15,7 @@ const EXAMPLES: &str = "\
 Examples:
   mimic import kick.fbx                             writes kick.clip
   mimic import pack.glb --take run --out run.clip   one take of many
+  mimic import pack.glb --take all --out clips/     each take as a clip of its own
   mimic import walk.fbx --trim 0.5..1.6 --loop wrap
   mimic import mixamo/*.fbx --out clips/            many files into a folder";
 
@@ -35,9 +36,14 @@ pub struct Args {
     import: ImportArgs,
 }
 
-/// One file to read and where its clip goes.
+/// Asks for every take of a file.
+const ALL: &str = "all";
+
+/// One take to read and where its clip goes.
 struct Step {
     input: PathBuf,
+    /// As for [`import::Options`].
+    take: Option<String>,
     output: PathBuf,
 }
 
@@ -58,7 +64,7 @@ impl Args {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        if let [_] = steps[..] {
+        if let ([_], false) = (&steps[..], self.wants_all()) {
             failures.pop().map_or(Ok(()), |(_, failure)| Err(failure))?;
             return reports
                 .iter()
@@ -70,43 +76,80 @@ impl Args {
 
     /// Everything that can be wrong with the command is found before the first file is written.
     fn plan(&self, library: &Path) -> Outcome<Vec<Step>> {
-        if let Some(out) = self
-            .out
-            .as_deref()
-            .filter(|out| self.files.len() > 1 && !names_folder(out))
-        {
+        let many = self.files.len() > 1 || self.wants_all();
+        if let Some(out) = self.out.as_deref().filter(|out| many && !names_folder(out)) {
             let out = out.display();
             return Err(Failure::user(format!(
-                "several files can't become the one file `{out}`, name a folder: `--out {out}/`"
+                "several clips can't become the one file `{out}`, name a folder: `--out {out}/`"
             )));
         }
         let mut taken = BTreeMap::new();
         let mut steps = Vec::new();
         for file in &self.files {
             let input = locate::file(file, library, &locate::SOURCES)?;
-            let output = result_path(self.out.as_deref(), &self.name(&input), "clip");
-            if let Some(other) = taken.insert(output.clone(), input.clone()) {
-                let (other, output) = (other.display(), output.display());
-                return Err(Failure::input(
-                    &input,
-                    format!("would become `{output}`, as would `{other}`"),
-                ));
+            for (take, name) in self.takes(&input)? {
+                let output = result_path(self.out.as_deref(), &name, "clip");
+                if let Some(other) = taken.insert(output.clone(), input.clone()) {
+                    let (other, output) = (other.display(), output.display());
+                    return Err(Failure::input(
+                        &input,
+                        format!("would become `{output}`, as would `{other}`"),
+                    ));
+                }
+                steps.push(Step {
+                    input: input.clone(),
+                    take,
+                    output,
+                });
             }
-            steps.push(Step { input, output });
         }
         Ok(steps)
     }
 
-    fn name(&self, input: &Path) -> String {
+    fn wants_all(&self) -> bool {
+        self.import.take() == Some(ALL)
+    }
+
+    /// The takes of a file that are wanted, and the names of their clips.
+    fn takes(&self, input: &Path) -> Outcome<Vec<(Option<String>, String)>> {
         let stem = input.file_stem().unwrap_or_default().to_string_lossy();
-        match self.import.take() {
-            Some(take) => format!("{stem}-{take}"),
-            None => stem.into_owned(),
+        if !self.wants_all() {
+            let take = self.import.take().map(str::to_owned);
+            let name = match &take {
+                Some(take) => format!("{stem}-{take}"),
+                None => stem.into_owned(),
+            };
+            return Ok(vec![(take, name)]);
         }
+        let found = import::inspect(input).map_err(|e| Failure::input(input, e))?;
+        let takes = found.takes;
+        if takes.is_empty() {
+            let told = found.problems.iter().find(|p| p.id == "no-takes");
+            let reason = told.map_or("holds no animation", |p| p.message.as_str());
+            return Err(Failure::input(input, reason));
+        }
+        let mut names: Vec<String> = Vec::new();
+        for (at, take) in takes.iter().enumerate() {
+            // What exporters put before a `|` is the armature's name.
+            let short = take.name.rsplit('|').next().unwrap_or(&take.name);
+            let name = file_name(&format!("{stem}-{short}"));
+            let is_new = !names.contains(&name);
+            names.push(if is_new {
+                name
+            } else {
+                format!("{name}-{}", at + 1)
+            });
+        }
+        let numbers = (1..=names.len()).map(|number| Some(number.to_string()));
+        Ok(numbers.zip(names).collect())
     }
 
     fn import(&self, step: &Step) -> Outcome<ClipReport> {
-        let Step { input, output } = step;
+        let Step {
+            input,
+            take,
+            output,
+        } = step;
         if locate::has_extension(input, "clip") {
             return Err(Failure::input(
                 input,
@@ -114,6 +157,7 @@ impl Args {
             ));
         }
         let options = import::Options {
+            take: take.clone(),
             mirror: self.mirror,
             ..self.import.options()
         };
@@ -141,12 +185,12 @@ fn print(reports: &[ClipReport], failures: &[Failed], printer: &Printer) -> Outc
 }
 
 /// Ends as the worst of the files did.
-fn summary(failures: Vec<Failed>, files: usize, printer: &Printer) -> Outcome {
+fn summary(failures: Vec<Failed>, clips: usize, printer: &Printer) -> Outcome {
     let count = failures.len();
     for (_, failure) in &failures {
         printer.error(failure.message().unwrap_or_default());
     }
-    let message = format!("{count} of {files} files could not be imported");
+    let message = format!("{count} of {clips} clips could not be made");
     let is_user = |(_, failure): &Failed| matches!(failure, Failure::User(_));
     match failures.iter().all(is_user) {
         _ if count == 0 => Ok(()),

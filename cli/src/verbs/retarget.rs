@@ -84,9 +84,9 @@ fn text(report: &Value) -> String {
     format!(
         "{motion}: {} frames in {:.2} s\n  \
          keypoint error   mean {:.1} cm, most {:.1} cm\n  \
-         foot skate       {:.1} cm/s\n  \
+         skate            {:.1} cm/s while the source stands\n  \
          penetration      mean {:.1} cm, most {:.1} cm\n  \
-         float            {:.1} cm\n  \
+         height           {:.1} cm while the source stands\n  \
          joint limits     {} violations",
         report["frames"],
         number("/seconds"),

@@ -180,3 +180,23 @@ fn a_map_is_written_for_the_rigs_that_need_one() {
         "null is read: {said}"
     );
 }
+
+#[test]
+fn every_take_becomes_a_clip() {
+    let bench = with_two_takes();
+    let said = bench.json(&["import", "two.gltf", "--take", "all", "--out", "takes/"]);
+    let clips = said["clips"].as_array().expect("a list");
+    for (clip, (path, take)) in clips
+        .iter()
+        .zip([("takes/two-up.clip", "up"), ("takes/two-down.clip", "down")])
+    {
+        assert_eq!(clip["clip"], path);
+        assert_eq!(bench.json(&["info", path])["takes"][0]["name"], take);
+    }
+    assert_eq!(clips.len(), 2);
+    let said = bench.complaint(
+        &["import", "two.gltf", "--take", "all", "--out", "x.clip"],
+        2,
+    );
+    assert!(said.contains("name a folder"), "{said}");
+}

@@ -2,8 +2,9 @@
 
 use super::at_least;
 use super::figure::{Figure, moving};
-use super::seam::{Seam, Side, carry_all, near};
+use super::seam::{Seam, Side, near};
 use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity};
+use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 
 /// Rest poses that differ by more, in metres or radians, are told of.
@@ -42,8 +43,9 @@ impl Clip {
     /// `next` put behind this clip, whose last piece has `piece` frames.
     fn follow(&mut self, mut next: Clip, figure: &Figure, piece: usize, blend: f64) {
         let carry = figure.carry(&next.world(0), &self.world(self.frames.len() - 1));
+        let theirs: Vec<(usize, Isometry3<f64>)> = figure.footings(&next).collect();
         let mut coming = std::mem::take(&mut next.frames);
-        carry_all(self, figure, &carry, &mut coming);
+        self.set_on(figure, &theirs, &carry, &mut coming);
         let half = |frames: usize| frames.saturating_sub(1) / 2;
         let window = (0.5 * blend * self.fps).round() as usize;
         let window = window.min(half(piece)).min(half(coming.len()));
@@ -61,6 +63,26 @@ impl Clip {
         seam.bend_start(&mut coming, window);
         self.frames.extend(coming.into_iter().skip(1));
         self.tell(next.problems);
+    }
+
+    /// Moves `poses` of a clip with the footings `theirs` over the ground, onto this clip's own: what stands still above
+    /// the carriers may stand elsewhere in the other clip.
+    fn set_on(
+        &self,
+        figure: &Figure,
+        theirs: &[(usize, Isometry3<f64>)],
+        carry: &Isometry3<f64>,
+        poses: &mut [Vec<Isometry3<f64>>],
+    ) {
+        let parent = |joint: &usize| self.joints[*joint].parent;
+        for ((joint, ours), (_, theirs)) in figure.footings(self).zip(theirs) {
+            let local = ours.inverse() * carry * theirs;
+            let above: Vec<usize> = std::iter::successors(parent(&joint), parent).collect();
+            for pose in poses.iter_mut() {
+                pose[joint] = local * pose[joint];
+                above.iter().for_each(|p| pose[*p] = self.frames[0][*p]);
+            }
+        }
     }
 
     fn check_room(&self, frames: usize) -> Result<(), Error> {

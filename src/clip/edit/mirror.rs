@@ -26,7 +26,7 @@ impl Plane {
             .filter_map(|&(left, right)| Some((*places.get(left)?, *places.get(right)?)))
             .collect();
         let fitted = Self::fitted(&sides);
-        if fitted.gap(&sides) <= SYMMETRIC * extent(&places) {
+        if !sides.is_empty() && fitted.gap(&sides) <= SYMMETRIC * extent(&places) {
             fitted
         } else {
             Self::across(Vector3::y_axis(), &sides)

@@ -42,7 +42,7 @@ impl Clip {
             return unusable("a joint stands before its parent");
         }
         if !(self.fps > 0.0 && self.fps <= MOST_FPS) {
-            return unusable("its frame rate is none");
+            return unusable("its frame rate isn't a number from 0 to 10000");
         }
         Ok(())
     }

@@ -168,6 +168,9 @@ fn curves(stack: &ufbx::AnimStack) -> impl Iterator<Item = (usize, &ufbx::AnimCu
     })
 }
 
+/// Keys of a curve that are looked at in the time that a question takes.
+const KEYS_PER_QUESTION: usize = 64;
+
 /// Layers × nodes and moved properties of a take.
 fn questions(stack: &ufbx::AnimStack, nodes: usize) -> usize {
     let properties = (&stack.layers).into_iter().map(|l| l.anim_props.len());
@@ -184,7 +187,9 @@ fn take(
 ) -> Take {
     let (name, layers) = (stack.element.name.to_string(), stack.layers.len());
     let channels = questions(stack, places.len());
-    match budget.checked_sub(channels) {
+    // Curves may be shared by many properties: their keys count wherever they are met.
+    let keys = curves(stack).map(|(_, curve)| curve.keyframes.len() / KEYS_PER_QUESTION);
+    match budget.checked_sub(channels.saturating_add(keys.sum())) {
         Some(left) => {
             *budget = left;
             Take {
@@ -194,7 +199,7 @@ fn take(
         }
         None => Take {
             fault: Some(format!(
-                "take `{name}` has {layers} layers for {} nodes, more than can be evaluated; merge its layers",
+                "take `{name}` has {layers} layers and their keys for {} nodes, more than can be evaluated; merge its layers",
                 places.len()
             )),
             ..Take::still(name)
