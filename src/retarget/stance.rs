@@ -129,7 +129,7 @@ pub(super) fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) 
     anchors.iter().map(row).collect()
 }
 
-/// `paths[limb][knob][f]`: centre of a limb's knob when the limb's key is at its goal.
+/// `paths[limb][knob][f]`: centre of a limb's knob when the limb is where and turned as its goals say.
 fn paths(model: &Model, goals: &Goals, limbs: &[Limb]) -> Vec<Vec<Vec<Vector3<f64>>>> {
     let mut pose: Pose = model.empty_pose();
     let mut paths: Vec<Vec<Vec<Vector3<f64>>>> = limbs
@@ -139,12 +139,17 @@ fn paths(model: &Model, goals: &Goals, limbs: &[Limb]) -> Vec<Vec<Vec<Vector3<f6
     for f in 0..goals.frames() {
         model.evaluate(&goals.guess[f], &mut pose);
         for (limb, paths) in limbs.iter().zip(&mut paths) {
-            let guessed = pose.bodies[goals.keys[limb.key].body].translation.vector;
-            let offset = goals.points[f][limb.key] - guessed;
+            let key = goals.keys[limb.key].body;
+            let guessed = pose.bodies[key];
+            // A chain of hinges can't be guessed well; where the limb is to turn is known all the same.
+            let wanted = goals.turns.iter().position(|turn| turn.body == key);
+            let wanted = wanted.map_or(guessed.rotation, |t| goals.rotations[f][t]);
+            let goal = Isometry3::from_parts(goals.points[f][limb.key].into(), wanted);
+            let moved = goal * guessed.inverse();
             for (knob, path) in limb.knobs.iter().zip(paths) {
                 let knob = &model.knobs[*knob];
                 let at = pose.bodies[knob.body] * nalgebra::Point3::from(knob.center);
-                path.push(at.coords + offset);
+                path.push((moved * at).coords);
             }
         }
     }
