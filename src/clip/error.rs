@@ -18,7 +18,7 @@ pub enum Error {
     )]
     Rate { fps: f64 },
     #[error(
-        "nothing is left after a trim from {from} s to {to} s of a clip of {duration:.3} s; trim within it"
+        "nothing is left after a trim from {from} s to {to:.3} s of a clip of {duration:.3} s; trim within it"
     )]
     EmptyTrim { from: f64, to: f64, duration: f64 },
     #[error(
