@@ -221,3 +221,39 @@ fn the_walk_is_a_walk() {
     );
     assert!((0.02..0.05).contains(&rise));
 }
+
+/// What the same poses become through both of our writers and the importers of both formats.
+#[test]
+fn a_take_in_two_formats_is_one_clip() {
+    let rig = Rig::new();
+    for (name, poses) in [("kick", kick::poses(&rig)), ("walk", walk::poses(&rig))] {
+        let read = |bytes: &[u8], file: &str| {
+            mimic::import::read(bytes, file, None, &Default::default()).expect("it imports")
+        };
+        let fbx = fbx::document(&rig, &poses, name).expect("it is written");
+        let (fbx, glb) = (
+            read(&fbx, "a.fbx"),
+            read(&glb::document(&rig, &poses, kick::FPS, name), "a.glb"),
+        );
+        assert!((fbx.fps - glb.fps).abs() < 1e-9, "{name}");
+        assert_eq!(fbx.loop_mode, glb.loop_mode, "{name}");
+        assert_eq!(fbx.frames.len(), glb.frames.len(), "{name}");
+        let partner =
+            |joint: &mimic::clip::Joint| glb.joints.iter().position(|o| o.name == joint.name);
+        let pairs: Vec<(usize, usize)> = (fbx.joints.iter().enumerate())
+            .filter_map(|(j, joint)| Some((j, partner(joint)?)))
+            .collect();
+        assert!(pairs.len() >= JOINTS, "{name}: {} of {JOINTS}", pairs.len());
+        for frame in 0..fbx.frames.len() {
+            let (a, b) = (fbx.world(frame), glb.world(frame));
+            for &(i, j) in &pairs {
+                let off = (a[i].translation.vector - b[j].translation.vector).norm();
+                assert!(
+                    off < 0.5e-3,
+                    "{name} {frame} {}: {off} m",
+                    fbx.joints[i].name
+                );
+            }
+        }
+    }
+}
