@@ -1,11 +1,12 @@
 //! `NAME.clip`: a safetensors file with the tensors of a [`Clip`] and its other fields as JSON metadata.
 //!
 //! Tensors, for J joints and F frames: `parent` i32 \[J\] (−1 for a root), `rest_translation` f32 \[J, 3\],
-//! `rest_rotation` f32 \[J, 4\], `local_translation` f32 \[F, J, 3\], `local_rotation` f32 \[F, J, 4\]. Metres, and
+//! `rest_rotation` f32 \[J, 4\], `local_translation` f32 \[F, J, 3\], `local_rotation` f32 \[F, J, 4\]; and of a part of
+//! a take `before_translation`, `before_rotation`, `after_translation`, `after_rotation`, alike. Metres, and
 //! quaternions w, x, y, z. The metadata key `mimic` holds the JSON object [`Header`].
 
 use super::sampling::{MOST_FPS, MOST_TRANSFORMS};
-use super::{Clip, Error, Joint, LoopMode, Problem, Source};
+use super::{Clip, Error, Joint, LoopMode, Margin, Problem, Source};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,9 @@ use std::path::Path;
 const FORMAT: &str = "clip";
 const VERSION: u32 = 1;
 const KEY: &str = "mimic";
+const LOCAL: [&str; 2] = ["local_translation", "local_rotation"];
+const BEFORE: [&str; 2] = ["before_translation", "before_rotation"];
+const AFTER: [&str; 2] = ["after_translation", "after_rotation"];
 /// Largest clip file that is read, in bytes.
 const MOST_BYTES: u64 = 4 << 30;
 
@@ -72,7 +76,8 @@ impl Clip {
     /// of its own or straight from the importer.
     pub(crate) fn round_to_file(&mut self) {
         let rests = self.joints.iter_mut().map(|joint| &mut joint.rest);
-        for at in rests.chain(self.frames.iter_mut().flatten()) {
+        let frames = self.frames.iter_mut().flatten();
+        for at in rests.chain(frames).chain(self.margin.transforms_mut()) {
             *at = rounded(at);
         }
     }
@@ -90,10 +95,9 @@ impl Clip {
             problems: self.problems.clone(),
         };
         let header = serde_json::to_string(&header).map_err(|e| e.to_string())?;
-        let (f, j) = (self.frames.len(), self.joints.len());
+        let j = self.joints.len();
         let rest = || self.joints.iter().map(|joint| &joint.rest);
-        let local = || self.frames.iter().flatten();
-        let tensors = [
+        let mut tensors = vec![
             ("parent", Dtype::I32, vec![j], parents(&self.joints)?),
             (
                 "rest_translation",
@@ -102,19 +106,15 @@ impl Clip {
                 translations(rest()),
             ),
             ("rest_rotation", Dtype::F32, vec![j, 4], rotations(rest())),
-            (
-                "local_translation",
-                Dtype::F32,
-                vec![f, j, 3],
-                translations(local()),
-            ),
-            (
-                "local_rotation",
-                Dtype::F32,
-                vec![f, j, 4],
-                rotations(local()),
-            ),
         ];
+        let Margin { before, after } = &self.margin;
+        tensors.extend(frames(LOCAL, j, &self.frames));
+        if !before.is_empty() {
+            tensors.extend(frames(BEFORE, j, before));
+        }
+        if !after.is_empty() {
+            tensors.extend(frames(AFTER, j, after));
+        }
         let mut views = Vec::new();
         for (name, dtype, shape, bytes) in &tensors {
             let view = TensorView::new(*dtype, shape.clone(), bytes).map_err(|e| e.to_string())?;
@@ -131,28 +131,64 @@ impl Clip {
         let header = header(bytes)?;
         let j = header.joints.len();
         let parent = values::<4>(&tensors, "parent", Dtype::I32, &[Some(j)])?;
-        let shape = [None, Some(j), Some(3)];
-        let translation = floats(&tensors, "local_translation", &shape)?;
-        let f = translation.len() / (3 * j);
-        if f == 0 || f.saturating_mul(j) > MOST_TRANSFORMS {
-            return Err(format!("{f} frames of {j} joints"));
+        let frames = read_frames(&tensors, LOCAL, j)?;
+        if frames.is_empty() {
+            return Err("0 frames".to_owned());
         }
-        let rotation = floats(&tensors, "local_rotation", &[Some(f), Some(j), Some(4)])?;
+        let around = |names: [&str; 2]| match tensors.tensor(names[0]) {
+            Ok(_) => read_frames(&tensors, names, j),
+            Err(_) => Ok(Vec::new()),
+        };
+        let margin = Margin {
+            before: around(BEFORE)?,
+            after: around(AFTER)?,
+        };
         let rest_translation = floats(&tensors, "rest_translation", &[Some(j), Some(3)])?;
         let rest_rotation = floats(&tensors, "rest_rotation", &[Some(j), Some(4)])?;
         let rest = isometries("rest_rotation", &rest_translation, &rest_rotation)?;
-        let local = isometries("local_rotation", &translation, &rotation)?;
         let parent: Vec<i32> = parent.into_iter().map(i32::from_le_bytes).collect();
         Ok(Clip {
             name: header.name,
             fps: header.fps,
             loop_mode: header.loop_mode,
             joints: joints(header.joints, &parent, rest)?,
-            frames: local.chunks_exact(j).map(<[_]>::to_vec).collect(),
+            frames,
+            margin,
             source: header.source,
             problems: header.problems,
         })
     }
+}
+
+type Tensor = (&'static str, Dtype, Vec<usize>, Vec<u8>);
+
+/// Two tensors of frames of `j` joints.
+fn frames(
+    [places, turns]: [&'static str; 2],
+    j: usize,
+    frames: &[Vec<Isometry3<f64>>],
+) -> [Tensor; 2] {
+    let (f, local) = (frames.len(), || frames.iter().flatten());
+    [
+        (places, Dtype::F32, vec![f, j, 3], translations(local())),
+        (turns, Dtype::F32, vec![f, j, 4], rotations(local())),
+    ]
+}
+
+/// The frames of `j` joints that two tensors hold.
+fn read_frames(
+    tensors: &SafeTensors<'_>,
+    [places, turns]: [&str; 2],
+    j: usize,
+) -> Result<Vec<Vec<Isometry3<f64>>>, String> {
+    let translation = floats(tensors, places, &[None, Some(j), Some(3)])?;
+    let f = translation.len() / (3 * j);
+    if f.saturating_mul(j) > MOST_TRANSFORMS {
+        return Err(format!("{f} frames of {j} joints"));
+    }
+    let rotation = floats(tensors, turns, &[Some(f), Some(j), Some(4)])?;
+    let local = isometries(turns, &translation, &rotation)?;
+    Ok(local.chunks_exact(j).map(<[_]>::to_vec).collect())
 }
 
 fn header(bytes: &[u8]) -> Result<Header, String> {

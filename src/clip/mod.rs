@@ -4,12 +4,14 @@ mod carry;
 pub mod edit;
 mod error;
 mod file;
+mod margin;
 mod sampling;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use carry::carry;
 pub use error::Error;
+pub use margin::Margin;
 pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
 
 use nalgebra::Isometry3;
@@ -83,6 +85,8 @@ pub struct Clip {
     pub joints: Vec<Joint>,
     /// `frames[f][j]`: transform of joint `j` in its parent at time `f / fps`.
     pub frames: Vec<Vec<Isometry3<f64>>>,
+    /// What was around the frames, where they are a part of a longer take.
+    pub margin: Margin,
     pub source: Source,
     pub problems: Vec<Problem>,
 }
@@ -95,7 +99,12 @@ impl Clip {
 
     /// World transforms of all joints at frame `frame`.
     pub fn world(&self, frame: usize) -> Vec<Isometry3<f64>> {
-        self.compose(|j| self.frames[frame][j])
+        self.world_from(&self.frames[frame])
+    }
+
+    /// World transforms of all joints with these local ones.
+    fn world_from(&self, local: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
+        self.compose(|j| local[j])
     }
 
     /// World transforms of all joints in the rest pose.
@@ -111,7 +120,7 @@ impl Clip {
         })
     }
 
-    /// The same joints and origin with other frames.
+    /// The same joints and origin with other frames, and nothing around them.
     fn with_frames(&self, frames: Vec<Vec<Isometry3<f64>>>, fps: f64, loop_mode: LoopMode) -> Clip {
         Clip {
             name: self.name.clone(),
@@ -119,6 +128,7 @@ impl Clip {
             loop_mode,
             joints: self.joints.clone(),
             frames,
+            margin: Margin::default(),
             source: self.source.clone(),
             problems: self.problems.clone(),
         }

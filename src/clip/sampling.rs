@@ -1,6 +1,6 @@
 //! A clip between its frames, at other rates, and in part.
 
-use super::{Clip, Error, LoopMode};
+use super::{Clip, Error, LoopMode, Margin};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A rate this close to the wanted one, relative to it, counts as the wanted one: files write 1/30 s as 0.033332.
@@ -125,7 +125,9 @@ impl Clip {
     pub fn resample(&self, fps: f64) -> Result<Clip, Error> {
         self.check()?;
         let grid = self.grid(self.duration(), fps)?;
-        Ok(self.sampled(0.0, grid, self.loop_mode))
+        let mut clip = self.sampled(0.0, grid, self.loop_mode);
+        clip.margin = self.margin_of(0.0, self.duration(), grid.fps);
+        Ok(clip)
     }
 
     /// The part from `from` to `to` seconds. It ends where it is cut; only the whole keeps its loop.
@@ -141,13 +143,34 @@ impl Clip {
                 duration,
             });
         }
-        let whole = start <= 0.0 && end >= duration;
-        let loop_mode = if whole {
-            self.loop_mode
-        } else {
-            LoopMode::Clamp
-        };
-        Ok(self.sampled(start, self.grid(end - start, self.fps)?, loop_mode))
+        if start <= 0.0 && end >= duration {
+            return Ok(self.clone());
+        }
+        let grid = self.grid(end - start, self.fps)?;
+        let mut part = self.sampled(start, grid, LoopMode::Clamp);
+        part.margin = self.margin_of(start, end, grid.fps);
+        Ok(part)
+    }
+
+    /// What is around the part from `start` to `end` seconds, margins included.
+    fn margin_of(&self, start: f64, end: f64, fps: f64) -> Margin {
+        let Margin { before, after } = &self.margin;
+        let parts = [before.as_slice(), &self.frames, after];
+        let long = self.with_frames(parts.concat(), self.fps, LoopMode::Clamp);
+        let start = start + before.len() as f64 / self.fps;
+        let end = end + before.len() as f64 / self.fps;
+        let (led, left) = (
+            Margin::frames(start, fps),
+            Margin::frames(long.duration() - end, fps),
+        );
+        let at = |time: f64| long.sample(time);
+        Margin {
+            before: (1..=led)
+                .rev()
+                .map(|k| at(start - k as f64 / fps))
+                .collect(),
+            after: (1..=left).map(|k| at(end + k as f64 / fps)).collect(),
+        }
     }
 
     pub(super) fn grid(&self, duration: f64, fps: f64) -> Result<Grid, Error> {

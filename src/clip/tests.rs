@@ -23,6 +23,7 @@ fn arm(frames: usize, fps: f64) -> Clip {
         loop_mode: LoopMode::Wrap,
         joints: vec![joint("root", None), joint("arm", Some(0))],
         frames: (0..frames).map(frame).collect(),
+        margin: Margin::default(),
         source: Source {
             file: "arm.glb".to_owned(),
             sha256: "00".to_owned(),

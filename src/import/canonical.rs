@@ -5,7 +5,7 @@ use super::rigid::{Frame, locals};
 use super::scene::Scene;
 use super::upright::{self, Stature};
 use super::{Error, UpAxis, tree};
-use crate::clip::{Grid, Joint, Problem, Severity};
+use crate::clip::{Joint, Problem, Severity};
 use nalgebra::{Isometry3, UnitQuaternion};
 
 /// A rest pose this much smaller than the first frame's, as a part of it, has collapsed.
@@ -89,16 +89,11 @@ impl<'a> Rig<'a> {
         Ok(world)
     }
 
-    /// World transforms at every frame of `grid`, which begins at `start` seconds of `take`.
-    pub fn frames(
-        &self,
-        take: usize,
-        start: f64,
-        grid: &Grid,
-    ) -> Result<Vec<Vec<Isometry3<f64>>>, Error> {
-        let mut frames: Vec<Vec<Isometry3<f64>>> = Vec::with_capacity(grid.frames);
-        for f in 0..grid.frames {
-            let at = Some((take, start + grid.time(f)));
+    /// World transforms at these seconds of `take`, one after the other.
+    pub fn frames(&self, take: usize, times: &[f64]) -> Result<Vec<Vec<Isometry3<f64>>>, Error> {
+        let mut frames: Vec<Vec<Isometry3<f64>>> = Vec::with_capacity(times.len());
+        for &time in times {
+            let at = Some((take, time));
             let world = self.world(at, frames.last().map(Vec::as_slice))?;
             frames.push(world);
         }

@@ -17,6 +17,7 @@ mod gltf;
 mod inspect;
 mod lead;
 mod measure;
+mod part;
 mod rigid;
 mod scene;
 mod seam;
@@ -34,12 +35,13 @@ pub use gltf::GltfError;
 pub use inspect::{Inspection, TakeInfo};
 
 use crate::clip::edit::Plane;
-use crate::clip::{Clip, Grid, LoopMode, MOST_TRANSFORMS, Problem, Severity, Source};
+use crate::clip::{Clip, LoopMode, Margin, Problem, Severity, Source};
 use crate::humanoid;
 use canonical::Rig;
 use detect::Format;
+use part::Part;
 use rigid::Frame;
-use scene::{Scene, Take};
+use scene::Scene;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -50,8 +52,6 @@ const MOST_BYTES: u64 = 2 << 30;
 /// but motion that fills them takes more.
 const FREE_TRANSFORMS: usize = 1 << 20;
 const TRANSFORMS_PER_BYTE: f64 = 0.5;
-/// Nodes or channels that may be looked at for each of these transforms: most of a file's nodes may be no joints.
-const LOOKS_PER_TRANSFORM: usize = 8;
 
 /// How a file is to be read, where it shouldn't decide itself.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -201,24 +201,27 @@ fn clip(
     most: usize,
 ) -> Result<Clip, Error> {
     let about = &scene.takes()[take];
-    let (start, end) = span(about, file, options.trim)?;
-    let rig = Rig::new(
-        scene,
-        file,
-        frame(scene, file, options)?,
-        Some((take, start)),
-    )?;
+    let span = part::span(about, file, options.trim)?;
+    // The same for every part of a take.
+    let first = Some((take, about.start));
+    let rig = Rig::new(scene, file, frame(scene, file, options)?, first)?;
     let fps = options.fps.unwrap_or(about.fps);
-    let most = most_frames(scene, about, rig.joints.len(), most);
-    let grid = grid(scene, file, about, end - start, fps, most)?;
-    let mut world = rig.frames(take, start, &grid)?;
+    let most = part::most_frames(scene, about, rig.joints.len(), most);
+    let mut part = Part::new(scene, file, about, span, fps, most)?;
+    let mut world = rig.frames(take, &part.times)?;
+    let has_first = part.times.first() == Some(&about.start);
+    let is_asked_for = options.trim.is_some() && part.own.start == 0;
+    let leads_nowhere = has_first && !is_asked_for && lead::is_apart(&world);
+    if leads_nowhere {
+        world.remove(0);
+        part.leave_out_first();
+    }
+    let after = world.split_off(part.own.end);
+    let before: Vec<_> = world.drain(..part.own.start).collect();
     let mut problems = scene.problems().to_vec();
     problems.extend_from_slice(&about.problems);
-    if options.trim.is_none() && lead::is_apart(&world) {
-        world.remove(0);
-        problems.push(lead::problem());
-    }
-    problems.extend(sampling_problems(&grid, fps, &world));
+    problems.extend((leads_nowhere && options.trim.is_none()).then(lead::problem));
+    problems.extend(sampling_problems(part.fps, fps, &world));
     let wraps = match options.loop_mode {
         Some(mode) => mode == LoopMode::Wrap,
         None => about
@@ -226,12 +229,19 @@ fn clip(
             .filter(|_| options.trim.is_none())
             .unwrap_or_else(|| seam::wraps(&world)),
     };
-    let locals = |frame: Vec<_>| rig.locals(&frame);
-    let frames = world.into_iter().map(locals).collect();
+    let locals = |world: Vec<Vec<_>>| world.iter().map(|frame| rig.locals(frame)).collect();
+    let frames = locals(world);
+    let margin = match wraps {
+        true => Margin::default(),
+        false => Margin {
+            before: locals(before),
+            after: locals(after),
+        },
+    };
     problems.extend(rig.problems);
     Ok(Clip {
         name: stem(file).to_owned(),
-        fps: grid.fps,
+        fps: part.fps,
         loop_mode: if wraps {
             LoopMode::Wrap
         } else {
@@ -239,6 +249,7 @@ fn clip(
         },
         joints: rig.joints,
         frames,
+        margin,
         source: Source {
             file: file.to_owned(),
             sha256: String::new(),
@@ -255,70 +266,19 @@ fn clip(
     })
 }
 
-/// Start and end, in the take's own seconds, of the part to keep.
-fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<(f64, f64), Error> {
-    let Some((from, to)) = trim else {
-        return Ok((take.start, take.end));
-    };
-    let duration = take.end - take.start;
-    let (start, end) = (from.max(0.0), to.min(duration));
-    if !(from <= to && start <= end) {
-        return Err(Error::EmptyTrim {
-            file: file.to_owned(),
-            take: take.name.clone(),
-            from,
-            to,
-            duration,
-        });
-    }
-    Ok((take.start + start, take.start + end))
-}
-
-/// Most frames that a take may be sampled to, given the most `transforms`: what is kept are the joints, but the time
-/// goes to all nodes and channels.
-fn most_frames(scene: &dyn Scene, take: &Take, joints: usize, transforms: usize) -> usize {
-    let transforms = transforms.min(MOST_TRANSFORMS);
-    let looks = scene.nodes().len().max(take.channels);
-    let kept = transforms / joints.max(1);
-    kept.min(transforms.saturating_mul(LOOKS_PER_TRANSFORM) / looks.max(1))
-}
-
-fn grid(
-    scene: &dyn Scene,
-    file: &str,
-    take: &Take,
-    duration: f64,
-    fps: f64,
-    most: usize,
-) -> Result<Grid, Error> {
-    let nodes = scene.nodes().len();
-    let Some(one) = Grid::new(0.0, fps, 2) else {
-        return Err(Error::Rate {
-            file: file.to_owned(),
-            fps,
-        });
-    };
-    Grid::new(duration, one.fps, most).ok_or_else(|| Error::TooLong {
-        file: file.to_owned(),
-        take: take.name.clone(),
-        frames: (duration * fps).round() + 1.0,
-        nodes,
-    })
-}
-
 fn sampling_problems(
-    grid: &Grid,
+    sampled: f64,
     fps: f64,
     world: &[Vec<nalgebra::Isometry3<f64>>],
 ) -> Vec<Problem> {
     let mut problems = Vec::new();
-    if grid.fps != fps {
+    if sampled != fps {
         problems.push(Problem {
             id: "rate-adjusted".to_owned(),
             severity: Severity::Note,
             message: format!(
                 "sampled at {:.3} Hz, not {fps} Hz, so that a frame falls on the end",
-                grid.fps
+                sampled
             ),
         });
     }

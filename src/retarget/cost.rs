@@ -72,6 +72,25 @@ impl Normal<'_> {
     }
 }
 
+impl<'a> Problem<'a> {
+    /// With the weights of a first fit.
+    pub fn new(
+        model: &'a Model<'a>,
+        goals: &'a Goals,
+        anchors: &'a [Vec<Anchor>],
+        fps: f64,
+    ) -> Problem<'a> {
+        Problem {
+            model,
+            goals,
+            anchors,
+            fps,
+            limit: weight::LIMIT,
+            ground: weight::GROUND,
+        }
+    }
+}
+
 impl Problem<'_> {
     /// Adds everything that depends on frame `f` alone; returns its cost.
     pub fn frame(&self, f: usize, qpos: &[f64], pose: &mut Pose, to: &mut Normal) -> f64 {

@@ -6,6 +6,7 @@ use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::skeleton::{Skeleton, limits};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::ops::Range;
 
 /// A point that follows the source: the origin of a body.
 #[derive(Clone, Copy, Debug)]
@@ -116,6 +117,13 @@ impl Goals {
 
     pub fn frames(&self) -> usize {
         self.points.len()
+    }
+
+    /// Leaves the frames `own`.
+    pub fn keep(&mut self, own: &Range<usize>) {
+        super::keep(&mut self.points, own);
+        super::keep(&mut self.rotations, own);
+        super::keep(&mut self.guess, own);
     }
 
     /// Moves everything at frame `f`.

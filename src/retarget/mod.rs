@@ -7,6 +7,7 @@
 mod align;
 mod banded;
 mod cost;
+mod flight;
 mod footing;
 mod goals;
 mod ground;
@@ -35,7 +36,8 @@ use model::Model;
 use nalgebra::Vector3;
 use solve::Solver;
 use source::Source;
-use stance::Contacts;
+use stance::{Anchor, Contacts};
+use std::ops::Range;
 use std::time::Instant;
 
 /// How to retarget.
@@ -111,6 +113,8 @@ pub fn retarget(
     let start = Instant::now();
     check(clip, skeleton)?;
     let map = joint_map(clip, options)?;
+    let (clip, own) = clip.with_margins();
+    let clip = clip.as_ref();
     let alignment = align::align(clip, &map, skeleton)?;
     let model = Model::new(skeleton);
     let mut goals = Goals::new(clip, &map, &alignment, &model);
@@ -118,24 +122,26 @@ pub fn retarget(
     let mut source = Source::new(clip, &map, &alignment, skeleton);
     let mut problems = clip.problems.clone();
     problems.extend(restore_travel(clip, &model, &mut goals, &mut source));
-    let contacts = put_on_ground(clip, &model, &mut goals, &mut source);
+    let mut contacts = put_on_ground(clip, &model, &mut goals, &mut source, own.start);
     let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
     let cycle = wraps.then(|| seam::cycle(&goals, &model));
     if let Some(cycle) = &cycle {
         problems.extend(seam::gap_problem(&goals, &model));
         seam::close(&mut goals, cycle, &model, clip.fps);
     }
-    let anchors = stance::plant(&model, &mut goals, &contacts, clip.fps, leg, cycle.as_ref());
-    let problem = Problem {
-        model: &model,
-        goals: &goals,
-        anchors: &anchors,
-        fps: clip.fps,
-        limit: cost::weight::LIMIT,
-        ground: cost::weight::GROUND,
-    };
-    let (qpos, iterations) = solve(&problem, cycle.as_ref());
-    let mut motion = motion(&problem, cycle, clip, qpos);
+    let mut anchors = stance::plant(&model, &mut goals, &contacts, clip.fps, leg, cycle.as_ref());
+    let Solved {
+        frames: mut qpos,
+        iterations,
+        lifted,
+    } = solve(&model, &mut goals, &anchors, clip.fps, cycle.as_ref());
+    problems.extend(flight::problem(lifted));
+    goals.keep(&own);
+    source.keep(&own);
+    keep(&mut anchors, &own);
+    keep(&mut qpos, &own);
+    contacts.iter_mut().for_each(|(_, flags)| keep(flags, &own));
+    let mut motion = motion(&model, &goals, &anchors, cycle, clip, qpos);
     let measured = stance::measured(&model, &goals, contacts, |end, f| {
         source.is_still(end, f, clip.fps, leg)
     });
@@ -150,14 +156,21 @@ pub fn retarget(
     })
 }
 
+/// Leaves the frames `own`.
+fn keep<T>(frames: &mut Vec<T>, own: &Range<usize>) {
+    frames.truncate(own.end);
+    frames.drain(..own.start);
+}
+
 /// The motion of these coordinates.
-fn motion(problem: &Problem, cycle: Option<Cycle>, clip: &Clip, qpos: Vec<Vec<f64>>) -> Motion {
-    let Problem {
-        model,
-        goals,
-        anchors,
-        ..
-    } = problem;
+fn motion(
+    model: &Model,
+    goals: &Goals,
+    anchors: &[Vec<Anchor>],
+    cycle: Option<Cycle>,
+    clip: &Clip,
+    qpos: Vec<Vec<f64>>,
+) -> Motion {
     let contact_bodies = stance::contact_bodies(model, goals, anchors);
     let draft = Draft {
         name: clip.name.clone(),
@@ -192,13 +205,14 @@ fn restore_travel(
     Some(travel::problem(&velocity))
 }
 
-/// Moves goals and source to where the ground is z = 0 and the root starts above the origin, and sets hands down.
-/// Returns when the source's feet and hands stand.
+/// Moves goals and source to where the ground is z = 0 and the root starts above the origin in frame `first`, and sets hands
+/// down. Returns when the source's feet and hands stand.
 fn put_on_ground(
     clip: &Clip,
     model: &Model,
     goals: &mut Goals,
     source: &mut Source,
+    first: usize,
 ) -> Vec<Contacts> {
     let (fps, leg, loop_mode) = (clip.fps, model.skeleton.leg_length(), clip.loop_mode);
     let ankle = ankle_height(model.skeleton);
@@ -213,7 +227,7 @@ fn put_on_ground(
     for hand in contacts.iter().filter(is_hand) {
         reach::set_down(goals, source, hand, &ground, fps);
     }
-    let root = goals.root(0);
+    let root = goals.root(first);
     let home = Vector3::new(-root.x, -root.y, -ground.floor - ground.lift);
     for f in 0..goals.frames() {
         goals.shift_frame(f, &home);
@@ -233,39 +247,83 @@ const STILL: Cycle = Cycle {
     heading: 0.0,
 };
 
-/// Fits the trajectory and brings it inside the joint limits.
-fn solve(problem: &Problem, cycle: Option<&Cycle>) -> (Vec<Vec<f64>>, usize) {
-    let mut frames = problem.goals.guess.clone();
+struct Solved {
+    frames: Vec<Vec<f64>>,
+    /// Steps of the first fit.
+    iterations: usize,
+    /// How far a flight was moved at most, metres.
+    lifted: f64,
+}
+
+/// Fits the trajectory, lets its flights follow gravity and brings it inside the joint limits.
+fn solve(
+    model: &Model,
+    goals: &mut Goals,
+    anchors: &[Vec<Anchor>],
+    fps: f64,
+    cycle: Option<&Cycle>,
+) -> Solved {
+    let mut frames = goals.guess.clone();
     if cycle.is_some() {
         frames.pop();
     }
-    let iterations = Solver::new(problem, cycle).run(&mut frames);
-    // Clamping moves feet, so it should have nothing left to do.
-    let skeleton = problem.model.skeleton;
-    let is_wrong = |qpos: &[f64]| {
-        limits::violations(skeleton, qpos) > 0
-            || skeleton.lowest_point(&skeleton.forward(qpos)) < -DEEPEST
-    };
-    let stiffer = cost::weight::STIFF_LIMITS.into_iter();
-    for (limit, ground) in stiffer.zip(cost::weight::STIFF_GROUND) {
-        if frames.iter().any(|qpos| is_wrong(qpos)) {
-            let stiff = Problem {
-                limit,
-                ground,
-                ..*problem
-            };
-            Solver::new(&stiff, cycle).mend(&mut frames, is_wrong);
-        }
+    let iterations = Solver::new(&Problem::new(model, goals, anchors, fps), cycle).run(&mut frames);
+    let lifts = flight::Air {
+        model,
+        frames: &frames,
+        anchors,
+        cycle,
+        fps,
     }
-    for qpos in &mut frames {
-        limits::clamp(skeleton, qpos);
+    .lifts();
+    for (f, lift) in lifts.iter().enumerate() {
+        let Some(lift) = lift else { continue };
+        flight::lift(model, goals, f, &anchors[f], lift);
+        frames[f]
+            .iter_mut()
+            .zip(&lift.shift)
+            .for_each(|(x, by)| *x += by);
     }
+    let problem = Problem::new(model, goals, anchors, fps);
+    if lifts.iter().any(Option::is_some) {
+        Solver::new(&problem, cycle).mend(&mut frames, |f, _| lifts[f].is_some());
+    }
+    mend(&problem, cycle, &mut frames);
     if let (Some(cycle), Some(first)) = (cycle, frames.first()) {
         let turn = rotation::exp(&(Vector3::z() * cycle.heading)).to_rotation_matrix();
         let last = solve::carried(first, turn.matrix(), &cycle.translation);
         frames.push(last);
     }
-    (frames, iterations)
+    let lifts = lifts.iter().flatten().filter(|lift| lift.flies);
+    Solved {
+        frames,
+        iterations,
+        lifted: lifts.map(|lift| lift.shift.norm()).fold(0.0, f64::max),
+    }
+}
+
+/// Solves again, more stiffly, where a coordinate is outside of its limits or a body below the ground.
+fn mend(problem: &Problem, cycle: Option<&Cycle>, frames: &mut [Vec<f64>]) {
+    // Clamping moves feet, so it should have nothing left to do.
+    let skeleton = problem.model.skeleton;
+    let is_wrong = |_: usize, qpos: &[f64]| {
+        limits::violations(skeleton, qpos) > 0
+            || skeleton.lowest_point(&skeleton.forward(qpos)) < -DEEPEST
+    };
+    let stiffer = cost::weight::STIFF_LIMITS.into_iter();
+    for (limit, ground) in stiffer.zip(cost::weight::STIFF_GROUND) {
+        if frames.iter().any(|qpos| is_wrong(0, qpos)) {
+            let stiff = Problem {
+                limit,
+                ground,
+                ..*problem
+            };
+            Solver::new(&stiff, cycle).mend(frames, is_wrong);
+        }
+    }
+    for qpos in frames {
+        limits::clamp(skeleton, qpos);
+    }
 }
 
 /// Height of the skeleton's ankles above its soles in its rest pose.

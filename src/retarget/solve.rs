@@ -79,9 +79,15 @@ impl<'a> Solver<'a> {
     }
 
     /// Solves again around the frames that are wrong; the others are taken to stand still.
-    pub fn mend(&self, frames: &mut [Vec<f64>], is_wrong: impl Fn(&[f64]) -> bool) {
+    pub fn mend(&self, frames: &mut [Vec<f64>], is_wrong: impl Fn(usize, &[f64]) -> bool) {
         for window in self.windows(frames.len()) {
-            let moved = |f: usize| if is_wrong(&frames[f]) { f64::MAX } else { 0.0 };
+            let moved = |f: usize| {
+                if is_wrong(f, &frames[f]) {
+                    f64::MAX
+                } else {
+                    0.0
+                }
+            };
             let moved: Vec<f64> = window.frames().map(moved).collect();
             self.settle(frames, window, &moved);
         }

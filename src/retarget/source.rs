@@ -8,6 +8,7 @@ use crate::motion::contact;
 use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, Vector3};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Feet and hands, with the joint further out that touches the ground with them.
 pub(super) const ENDS: [(Slot, Option<Slot>); 4] = [
@@ -101,6 +102,17 @@ impl Source {
         let level = (heights[0] - heights[1]).abs() < LIKE_REST * leg;
         let stands = (STANDS[0]..STANDS[1]).contains(&lowest) && level;
         stands.then_some((heights[0] + heights[1]) / 2.0)
+    }
+
+    /// Leaves the frames `own`.
+    pub fn keep(&mut self, own: &Range<usize>) {
+        self.points
+            .values_mut()
+            .for_each(|path| super::keep(path, own));
+        self.fingers
+            .iter_mut()
+            .for_each(|tips| super::keep(tips, own));
+        self.frames = own.len();
     }
 
     /// Moves frame `f`.

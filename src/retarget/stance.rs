@@ -69,6 +69,16 @@ fn under(model: &Model, top: usize, body: usize) -> bool {
     std::iter::successors(Some(body), |b| model.skeleton.bodies[*b].parent).any(|b| b == top)
 }
 
+/// Whether the body in `slot` or one that hangs on it stands.
+pub(super) fn carries(model: &Model, slot: Slot, anchors: &[Anchor]) -> bool {
+    let body = model.skeleton.slots.get(&slot);
+    let stands = |body: &usize| {
+        let mut knobs = anchors.iter().map(|a| model.knobs[a.knob].body);
+        knobs.any(|knob| under(model, *body, knob))
+    };
+    body.is_some_and(stands)
+}
+
 /// Bodies that may touch the ground: feet with what hangs on them, and hands if the clip sets them down.
 pub(super) fn contact_bodies(model: &Model, goals: &Goals, anchors: &[Vec<Anchor>]) -> Vec<usize> {
     let used = |body: usize| {
@@ -116,7 +126,7 @@ pub(super) fn measured(
 }
 
 /// Weight from which on an anchor means contact.
-const TOUCHES: f64 = 0.5;
+pub(super) const TOUCHES: f64 = 0.5;
 
 /// `contact[f][c]`: whether contact body `c` stands at frame `f`.
 pub(super) fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) -> Vec<Vec<bool>> {

@@ -1,6 +1,6 @@
 //! Left and right swapped.
 
-use crate::clip::{Clip, Error, Joint, Problem, Severity};
+use crate::clip::{Clip, Error, Joint, Margin, Problem, Severity};
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Pairs that rest farther from each other's mirror image than this part of the figure's size are told of.
@@ -156,9 +156,16 @@ impl Clip {
             .iter()
             .map(|at| unit(&at.rotation))
             .collect();
-        let frames = self.frames.iter();
-        let frames = frames.map(|frame| self.mirrored(frame, &rest, &partners, plane));
-        let mut clip = self.with_frames(frames.collect(), self.fps, self.loop_mode);
+        let mirrored = |frames: &[Vec<Isometry3<f64>>]| {
+            let frames = frames.iter();
+            let frames = frames.map(|frame| self.mirrored(frame, &rest, &partners, plane));
+            frames.collect()
+        };
+        let mut clip = self.with_frames(mirrored(&self.frames), self.fps, self.loop_mode);
+        clip.margin = Margin {
+            before: mirrored(&self.margin.before),
+            after: mirrored(&self.margin.after),
+        };
         clip.tell(self.asymmetry(pairs, plane));
         Ok(clip)
     }

@@ -1,4 +1,5 @@
 mod recorded;
+mod trimmed;
 mod windows;
 
 use super::goals::{Key, Turn};
@@ -6,7 +7,7 @@ use super::model::put_quaternion;
 use super::stance::Anchor;
 use super::system::Window;
 use super::*;
-use crate::clip::{Joint, Source};
+use crate::clip::{Joint, Margin, Source};
 use crate::humanoid::Slot;
 use crate::import;
 use nalgebra::{Isometry3, UnitQuaternion};
@@ -126,6 +127,7 @@ fn rig(skeleton: &Skeleton, rest: &[f64], frames: &[Vec<f64>], size: f64, down: 
         loop_mode: LoopMode::Clamp,
         joints: joints.collect(),
         frames: frames.iter().map(|qpos| local(&world(qpos))).collect(),
+        margin: Margin::default(),
         source: Source {
             file: "rig".to_owned(),
             sha256: String::new(),

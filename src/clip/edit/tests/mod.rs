@@ -4,7 +4,7 @@ mod mirror;
 mod time;
 mod travel;
 
-use crate::clip::{Clip, Error, Joint, LoopMode, Source};
+use crate::clip::{Clip, Error, Joint, LoopMode, Margin, Source};
 use crate::import;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::path::PathBuf;
@@ -44,6 +44,7 @@ fn clip(joints: Vec<Joint>, fps: f64, frames: Vec<Vec<Isometry3<f64>>>) -> Clip 
         loop_mode: LoopMode::Clamp,
         joints,
         frames,
+        margin: Margin::default(),
         source: Source {
             file: "made.bvh".to_owned(),
             sha256: String::new(),

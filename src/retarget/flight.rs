@@ -1,0 +1,323 @@
+//! Flights: while nothing touches the ground, the centre of mass follows a parabola.
+//!
+//! A character of other proportions, or an animator's sense of time, makes flights that no gravity makes. The centre of
+//! mass goes from where it left the ground to where it comes down again along c(t) = c₀ + v t − ½ g t², in the time that
+//! the source takes; the body is moved along with it, as it is.
+
+use super::goals::Goals;
+use super::model::Model;
+use super::stance::{Anchor, TOUCHES, carries};
+use crate::clip::{Problem, Severity};
+use crate::humanoid::Slot;
+use crate::motion::{Cycle, GRAVITY};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// Height of the lowest point from which on a body is in the air, and that it reaches in a flight, leg lengths.
+const CLEAR: f64 = 0.015;
+const HIGH: f64 = 0.03;
+/// Shortest flight, s.
+const SHORTEST: f64 = 0.1;
+/// A flight falls at least half as fast as it should: slower ones are steps with feet that float, …
+const SLOWEST: f64 = 0.5;
+/// … and it is no further from its parabola than this in any case, leg lengths …
+const FARTHEST: f64 = 0.35;
+/// … and always meant if it is as near as this, leg lengths.
+const NEAR: f64 = 0.04;
+/// Time before and after a flight in which the body gathers and takes up the speed that it changes, s.
+const GATHERS: f64 = 0.15;
+
+/// A flight that is moved further than this is told of, metres.
+const TOLD: f64 = 0.03;
+
+/// How a body is moved, and whether it flies there; elsewhere it keeps its feet and hands on the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lift {
+    pub shift: Vector3<f64>,
+    pub flies: bool,
+}
+
+/// A trajectory of poses and what stands in it.
+pub(super) struct Air<'a> {
+    pub model: &'a Model<'a>,
+    /// Without the last one of a cycle.
+    pub frames: &'a [Vec<f64>],
+    pub anchors: &'a [Vec<Anchor>],
+    pub cycle: Option<&'a Cycle>,
+    pub fps: f64,
+}
+
+/// Indices of the last frame on the ground before a flight and the first after it.
+type Span = (i64, i64);
+
+impl Air<'_> {
+    /// How every frame is to be moved so that flights follow gravity; `None` where it stays.
+    pub fn lifts(&self) -> Vec<Option<Lift>> {
+        let bodies: Vec<_> = self
+            .frames
+            .iter()
+            .map(|q| self.model.skeleton.forward(q))
+            .collect();
+        let com: Vec<_> = bodies.iter().map(|b| self.model.skeleton.com(b)).collect();
+        let low: Vec<_> = bodies
+            .iter()
+            .map(|b| self.model.skeleton.lowest_point(b))
+            .collect();
+        let mut lifts = vec![None; self.frames.len()];
+        for (span, room) in self.flights(&low) {
+            let Some(shifts) = self.shifts(span, &com) else {
+                continue;
+            };
+            for (index, lift) in self.with_ends(span, room, &shifts) {
+                if let Some((n, f)) = self.locate(index) {
+                    let back = self.offset(n).rotation.inverse();
+                    let shift = back * lift.shift;
+                    lifts[f] = Some(Lift { shift, ..lift });
+                }
+            }
+        }
+        lifts
+    }
+
+    /// Cycle number and frame of an index; `None` before the first and after the last frame of what doesn't repeat.
+    fn locate(&self, index: i64) -> Option<(i64, usize)> {
+        let count = self.frames.len() as i64;
+        let (n, f) = (index.div_euclid(count), index.rem_euclid(count));
+        (n == 0 || self.cycle.is_some()).then_some((n, f as usize))
+    }
+
+    /// What carries the first cycle to cycle number `n`.
+    fn offset(&self, n: i64) -> Isometry3<f64> {
+        self.cycle
+            .map_or_else(Isometry3::identity, |cycle| cycle.offset(n))
+    }
+
+    /// All flights that begin in the frames, each with the frames on the ground before and after it.
+    fn flights(&self, low: &[f64]) -> Vec<(Span, [i64; 2])> {
+        let leg = self.model.skeleton.leg_length();
+        let touches = |f: usize| self.anchors[f].iter().any(|a| a.weight >= TOUCHES);
+        let up: Vec<bool> = (0..low.len())
+            .map(|f| low[f] > CLEAR * leg && !touches(f))
+            .collect();
+        let is_up = |index: i64| self.locate(index).map(|(_, f)| up[f]);
+        let count = self.frames.len() as i64;
+        let run = |from: i64, step: i64, state: bool| {
+            let on = |i: &i64| is_up(from + step * i) == Some(state);
+            (0..=count).take_while(on).count() as i64
+        };
+        let begins = |f: &i64| is_up(*f) == Some(false) && is_up(f + 1) == Some(true);
+        let starts = (0..count).filter(begins);
+        let whole = starts.map(|a| (a, a + 1 + run(a + 1, 1, true)));
+        let known = whole.filter(|(a, b)| b - a <= count && is_up(*b) == Some(false));
+        let high = |(a, b): &Span| {
+            let mut heights = (a + 1..*b).filter_map(|i| self.locate(i));
+            (b - a) as f64 >= SHORTEST * self.fps && heights.any(|(_, f)| low[f] > HIGH * leg)
+        };
+        let flights = known.filter(high);
+        flights
+            .map(|(a, b)| ((a, b), [run(a, -1, false), run(b, 1, false)]))
+            .collect()
+    }
+
+    /// From the frame before the flight to the one after it: how far the centre of mass is from its parabola; `None` if
+    /// so far that it is no flight.
+    fn shifts(&self, (a, b): Span, com: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+        let place = |index: i64| {
+            let (n, f) = self.locate(index)?;
+            Some((self.offset(n) * Point3::from(com[f])).coords)
+        };
+        let (start, end) = (place(a)?, place(b)?);
+        let duration = (b - a) as f64 / self.fps;
+        let gravity = Vector3::z() * GRAVITY;
+        let speed = (end - start) / duration + gravity * (duration / 2.0);
+        let off = |index: i64| {
+            let t = (index - a) as f64 / self.fps;
+            Some(start + speed * t - gravity * (t * t / 2.0) - place(index)?)
+        };
+        let shifts: Vec<_> = (a..=b).map(off).collect::<Option<_>>()?;
+        let leg = self.model.skeleton.leg_length();
+        let rise = GRAVITY * duration * duration / 8.0;
+        let most = (SLOWEST * rise).min(FARTHEST * leg).max(NEAR * leg);
+        let farthest = shifts.iter().map(Vector3::norm).fold(0.0, f64::max);
+        (farthest <= most).then_some(shifts)
+    }
+
+    /// A flight's moves, and before and after it those that lead to and from their speed: the cubic that begins at rest
+    /// and comes back with that speed. A stance between two flights is shared by them.
+    fn with_ends(&self, (a, b): Span, room: [i64; 2], shifts: &[Vector3<f64>]) -> Vec<(i64, Lift)> {
+        let last = shifts.len() - 1;
+        let longest = (GATHERS * self.fps).round();
+        let ends = [(a, -1, shifts[1]), (b, 1, shifts[last - 1])];
+        let mut lifts = Vec::new();
+        for ((from, step, next), room) in ends.into_iter().zip(room) {
+            let width = longest.min(room as f64 / 2.0);
+            for away in 1..width.ceil() as i64 {
+                let u = 1.0 - away as f64 / width;
+                // In time away from the ground the body moves by `next` a frame.
+                let shift = next * (-width * u * u * (1.0 - u));
+                lifts.push((
+                    from + step * away,
+                    Lift {
+                        shift,
+                        flies: false,
+                    },
+                ));
+            }
+        }
+        let flying = shifts.iter().enumerate().take(last).skip(1);
+        lifts.extend(flying.map(|(i, shift)| {
+            (
+                a + i as i64,
+                Lift {
+                    shift: *shift,
+                    flies: true,
+                },
+            )
+        }));
+        lifts
+    }
+}
+
+/// Moves the goals of a frame; where the body doesn't fly, what stands stays and its knee or elbow goes half the way.
+pub(super) fn lift(model: &Model, goals: &mut Goals, f: usize, anchors: &[Anchor], lift: &Lift) {
+    for (key, point) in goals.keys.iter().zip(&mut goals.points[f]) {
+        let end = match key.slot {
+            Slot::LeftLowerLeg => Slot::LeftFoot,
+            Slot::RightLowerLeg => Slot::RightFoot,
+            Slot::LeftLowerArm => Slot::LeftHand,
+            Slot::RightLowerArm => Slot::RightHand,
+            slot => slot,
+        };
+        let stands = !lift.flies && carries(model, end, anchors);
+        let share = match (stands, end == key.slot) {
+            (false, _) => 1.0,
+            (true, false) => 0.5,
+            (true, true) => 0.0,
+        };
+        *point += lift.shift * share;
+    }
+}
+
+/// Tells of flights that were moved far.
+pub(super) fn problem(lifted: f64) -> Option<Problem> {
+    (lifted > TOLD).then(|| Problem {
+        id: "flight-corrected".to_owned(),
+        severity: Severity::Note,
+        message: format!(
+            "a flight was no free fall, so the body was moved by up to {:.0} cm in the air; the distance from the source's joints has that in it",
+            lifted * 100.0
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::skeleton::Skeleton;
+
+    const FPS: f64 = 60.0;
+    const STANDS: usize = 20;
+    const FLIES: usize = 24;
+
+    /// The humanoid at rest stands, jumps forward under a part of gravity, and stands again.
+    fn jump(skeleton: &Skeleton, gravity: f64) -> Vec<Vec<f64>> {
+        let rest = skeleton.rest_qpos();
+        let low = skeleton.lowest_point(&skeleton.forward(&rest));
+        let frames = 0..2 * STANDS + FLIES + 1;
+        let duration = FLIES as f64 / FPS;
+        let frame = |f: usize| {
+            let t = (f.saturating_sub(STANDS) as f64 / FPS).min(duration);
+            let mut qpos = rest.clone();
+            qpos[0] += t;
+            qpos[2] += gravity * t * (duration - t) / 2.0 - low;
+            qpos
+        };
+        frames.map(frame).collect()
+    }
+
+    fn lifts(skeleton: &Skeleton, frames: &[Vec<f64>], cycle: Option<&Cycle>) -> Vec<Option<Lift>> {
+        let air = Air {
+            model: &Model::new(skeleton),
+            frames,
+            anchors: &vec![Vec::new(); frames.len()],
+            cycle,
+            fps: FPS,
+        };
+        air.lifts()
+    }
+
+    fn moved(frames: &[Vec<f64>], lifts: &[Option<Lift>]) -> Vec<Vector3<f64>> {
+        let place = |(qpos, lift): (&Vec<f64>, &Option<Lift>)| {
+            let shift = lift.map_or_else(Vector3::zeros, |lift| lift.shift);
+            super::super::model::vector(qpos, 0) + shift
+        };
+        frames.iter().zip(lifts).map(place).collect()
+    }
+
+    #[test]
+    fn a_jump_falls_freely() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+        for gravity in [0.7 * GRAVITY, 1.3 * GRAVITY] {
+            let frames = jump(&skeleton, gravity);
+            let path = moved(&frames, &lifts(&skeleton, &frames, None));
+            let bend = |f: usize| (path[f - 1] - path[f] * 2.0 + path[f + 1]) * FPS * FPS;
+            for f in STANDS + 1..STANDS + FLIES {
+                assert!((bend(f) + Vector3::z() * GRAVITY).norm() < 1e-9, "{f}");
+            }
+            // It gathers, and takes off and lands with the speed of the flight.
+            let jumps =
+                |path: &[Vector3<f64>], f: usize| (path[f - 1] - path[f] * 2.0 + path[f + 1]).z;
+            let before: Vec<_> = frames
+                .iter()
+                .map(|q| super::super::model::vector(q, 0))
+                .collect();
+            let change = jumps(&path, STANDS) - jumps(&before, STANDS);
+            let speed = (GRAVITY - gravity).abs() * FLIES as f64 / (2.0 * FPS * FPS);
+            assert!(change.abs() < 0.5 * speed, "{change} of {speed}");
+            assert_eq!(path[STANDS], before[STANDS]);
+            assert_eq!(path[0], before[0]);
+        }
+    }
+
+    /// The same jump, beginning in its midst and going round a curve.
+    #[test]
+    fn a_jump_over_the_seam_of_a_cycle_is_the_same_jump() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+        let mut frames = jump(&skeleton, 0.7 * GRAVITY);
+        let straight = lifts(&skeleton, &frames, None);
+        let cycle = Cycle {
+            translation: Vector3::new(0.0, 1.0, 0.0),
+            heading: 0.8,
+        };
+        let cut = STANDS + 10;
+        let mut ring = frames.split_off(cut);
+        let onward = cycle.offset(1);
+        let turn = onward.rotation;
+        for qpos in &mut frames {
+            let at = onward * Point3::from(super::super::model::vector(qpos, 0));
+            qpos[..3].copy_from_slice(at.coords.as_slice());
+            let facing = turn * super::super::model::quaternion(qpos, 3);
+            super::super::model::put_quaternion(qpos, 3, &facing);
+        }
+        let rest = ring.len();
+        ring.append(&mut frames);
+        let round = lifts(&skeleton, &ring, Some(&cycle));
+        for (f, lift) in straight.iter().enumerate() {
+            let (at, back) = match f.checked_sub(cut) {
+                Some(at) => (at, nalgebra::UnitQuaternion::identity()),
+                None => (rest + f, turn.inverse()),
+            };
+            let shift = |lift: Option<Lift>| lift.map_or_else(Vector3::zeros, |lift| lift.shift);
+            let apart = back * shift(round[at]) - shift(*lift);
+            assert!(apart.norm() < 1e-9, "{f}: {apart}");
+        }
+    }
+
+    #[test]
+    fn feet_that_float_are_no_flight() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+        let frames = jump(&skeleton, 0.3 * GRAVITY);
+        let found = lifts(&skeleton, &frames, None);
+        assert!(found.iter().all(Option::is_none));
+        assert_eq!(problem(0.0), None);
+    }
+}
