@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 /// What a run keeps of its evaluation with the default options.
 pub const EVALUATION: &str = "eval.json";
 
+/// What a run writes while it learns, a line per iteration.
+pub const METRICS: &str = "metrics.jsonl";
+
 /// How well a run performs one of its motions.
 #[derive(Serialize)]
 pub struct Measured {

@@ -298,3 +298,48 @@ fn bench_has_the_fields_that_scripts_rely_on() {
     }
     assert!(report["network"].is_array());
 }
+
+#[test]
+fn curves_are_drawn_of_several_runs() {
+    let bench = with_run();
+    let other = [
+        "train", "sway.txt", "--preset", "run", "--seed", "2", "--out", "other",
+    ];
+    bench.mimic(&other).assert().success();
+    let report = bench.json(&["plot", "run", "other", "--out", "both.svg"]);
+    assert_eq!(report["plot"], "both.svg");
+    for (run, name) in [(0, "run"), (1, "other")] {
+        let run = &report["runs"][run];
+        assert_eq!(run["name"], name);
+        assert_eq!(run["samples"], serde_json::json!([128, 256, 384, 512]));
+        assert_eq!(run["value_loss"].as_array().map(Vec::len), Some(4));
+        assert!(run["evaluation"]["survival"].is_number());
+    }
+    let drawn = std::fs::read_to_string(bench.path("both.svg")).expect("a drawing");
+    for text in [">run<", ">other<", "policy loss", "evaluation: survival"] {
+        assert!(drawn.contains(text), "{text}");
+    }
+    bench
+        .mimic(&["plot", "run", "--smooth", "1"])
+        .assert()
+        .success();
+    assert!(bench.path("run.svg").exists());
+}
+
+#[test]
+fn a_run_that_cannot_be_drawn_is_named() {
+    let bench = with_run();
+    let said = bench.complaint(&["plot", "absent"], 2);
+    assert!(said.contains("absent"), "{said}");
+    bench.write("run/metrics.jsonl", b"{\"samples\": 1}\nnothing\n");
+    let said = bench.complaint(&["plot", "run"], 2);
+    assert!(
+        said.contains("metrics.jsonl") && said.contains("line 2"),
+        "{said}"
+    );
+    bench.write("run/metrics.jsonl", b"");
+    let said = bench.complaint(&["plot", "run"], 2);
+    assert!(said.contains("train longer"), "{said}");
+    std::fs::remove_file(bench.path("run/metrics.jsonl")).expect("it was written");
+    bench.complaint(&["plot", "run"], 2);
+}
