@@ -6,7 +6,7 @@ use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::clip::LoopMode;
-use mimic::evaluate::{self, Evaluation, Options};
+use mimic::evaluate::{self, Evaluation, Options, Start};
 use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
 use mimic::motion::MotionError;
 use serde::Serialize;
@@ -96,7 +96,8 @@ pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
             which + 1
         ))
     })?;
-    let trace = evaluate::play(&performer, which, 0.0, seconds).map_err(learn_failure)?;
+    let trace =
+        evaluate::play(&performer, which, Start::At(0.0), seconds, None).map_err(learn_failure)?;
     if trace.frames.is_empty() {
         return Err(Failure::work(
             "the agent fails in its first step, there is nothing to show; train it longer",
