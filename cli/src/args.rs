@@ -15,6 +15,7 @@ Examples:
   mimic train kick.fbx              learn to perform it; the result is a run, runs/kick
   mimic replay kick --rerun         watch the agent with its reference
   mimic eval kick                   how well it does
+  mimic plot kick                   how it learned, as a drawing
 
 Every stage takes the file of an earlier stage and does what is missing. Inputs are found by path, or
 by name in the library folder; left out, the most recent one is taken. Results go to standard output,
@@ -65,6 +66,7 @@ pub enum Verb {
     Train(verbs::train::Args),
     Eval(verbs::eval::Args),
     Replay(verbs::replay::Args),
+    Plot(verbs::plot::Args),
     Bench(verbs::bench::Args),
     Doctor(verbs::doctor::Args),
     Completions(verbs::completions::Args),

@@ -6,7 +6,7 @@ use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::clip::LoopMode;
-use mimic::evaluate::{self, Evaluation, Options};
+use mimic::evaluate::{self, Evaluation, Options, Start};
 use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
 use mimic::motion::MotionError;
 use serde::Serialize;
@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 
 /// What a run keeps of its evaluation with the default options.
 pub const EVALUATION: &str = "eval.json";
+
+/// What a run writes while it learns, a line per iteration.
+pub const METRICS: &str = "metrics.jsonl";
 
 /// How well a run performs one of its motions.
 #[derive(Serialize)]
@@ -93,7 +96,8 @@ pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
             which + 1
         ))
     })?;
-    let trace = evaluate::play(&performer, which, 0.0, seconds).map_err(learn_failure)?;
+    let trace =
+        evaluate::play(&performer, which, Start::At(0.0), seconds, None).map_err(learn_failure)?;
     if trace.frames.is_empty() {
         return Err(Failure::work(
             "the agent fails in its first step, there is nothing to show; train it longer",

@@ -3,7 +3,9 @@
 use crate::clip::LoopMode;
 use crate::learn::{LearnError, Memory, Performer};
 use crate::sim::LinkState;
-use crate::task::{Dynamics, Failure, Outcome, Sample, Setting, Stage, Terminations, Terms};
+use crate::task::{
+    Dynamics, Failure, Outcome, Perturbations, Sample, Setting, Stage, Terminations, Terms,
+};
 use nalgebra::{Point3, Vector3};
 
 /// Mean distance of the bodies from their reference beyond which an episode has failed, metres.
@@ -24,11 +26,19 @@ pub struct Frame {
     pub reward: f32,
 }
 
+/// How an episode begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// In the reference's own state at this share of the motion.
+    At(f64),
+    /// In the rest pose, standing still, at the reference's first frame.
+    Rest,
+}
+
 /// An episode.
 #[derive(Clone, Debug)]
 pub struct Trace {
-    /// Start as a share of the motion.
-    pub start: f64,
+    pub start: Start,
     pub control_hz: f64,
     pub frames: Vec<Frame>,
     /// Steps of an episode without failure.
@@ -42,7 +52,8 @@ pub struct Trace {
     pub contact_links: Vec<usize>,
 }
 
-/// Plays reference number `which` from the share `start` of its length, for `seconds` or to its end.
+/// Plays reference number `which` from `start`, for `seconds` or to its end, disturbed as `disturbed` says and by its
+/// seed.
 ///
 /// An episode fails by a fall, or when the bodies are 0.5 m from their reference in the mean, whatever rules the policy
 /// was trained under.
@@ -52,11 +63,12 @@ pub struct Trace {
 pub fn play(
     performer: &Performer,
     which: usize,
-    start: f64,
+    start: Start,
     seconds: f64,
+    disturbed: Option<(Perturbations, u64)>,
 ) -> Result<Trace, LearnError> {
     let rules = Terminations {
-        distance: f32::INFINITY,
+        distance: None,
         fall: true,
         reward: None,
     };
@@ -68,10 +80,17 @@ pub fn play(
     let setting = Setting {
         terminations: rules,
         episode_s,
+        perturbations: disturbed.map_or_else(Perturbations::default, |(ranges, _)| ranges),
         ..*performer.setting()
     };
     let mut env = performer.environment(which, &setting);
-    env.reset(start * env.last_start());
+    match start {
+        Start::At(share) => env.reset(share * env.last_start()),
+        Start::Rest => env.reset_at_rest(),
+    }
+    if let Some((_, seed)) = disturbed {
+        env.perturb(seed);
+    }
     let mut trace = Trace {
         start,
         control_hz: setting.physics.control_hz,

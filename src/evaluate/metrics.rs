@@ -1,6 +1,6 @@
 //! Metrics over the frames of episodes; formulas as in DeepMimic, PHC and the papers they name.
 
-use super::episode::{Frame, Trace, positions};
+use super::episode::{Frame, Start, Trace, positions};
 use crate::motion::skate;
 use crate::sim::{Link, LinkState};
 use crate::skeleton::Twist;
@@ -41,13 +41,49 @@ pub struct Evaluation {
     pub root_rotation_turned_rad: f64,
     /// How far the reference turned about it.
     pub root_rotation_reference_rad: f64,
+    /// One more episode, from standing still in the rest pose.
+    #[serde(default)]
+    pub from_rest: Option<Digest>,
+    /// The same phases again, disturbed.
+    #[serde(default)]
+    pub perturbed: Option<Digest>,
+}
+
+/// The fields of an [`Evaluation`] that count where an agent has more to do than to track.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Digest {
+    pub episodes: usize,
+    pub survival: f64,
+    pub success_mean_0_5: f64,
+    pub mpjpe_global_mm: f64,
+    pub mpjpe_local_mm: f64,
+    pub normalized_return: f64,
+}
+
+impl From<&Evaluation> for Digest {
+    fn from(all: &Evaluation) -> Self {
+        Self {
+            episodes: all.episodes,
+            survival: all.survival,
+            success_mean_0_5: all.success_mean_0_5,
+            mpjpe_global_mm: all.mpjpe_global_mm,
+            mpjpe_local_mm: all.mpjpe_local_mm,
+            normalized_return: all.normalized_return,
+        }
+    }
 }
 
 /// Measures episodes.
 pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
     let per_episode = |value: &dyn Fn(&Trace) -> f64| mean(traces.iter().map(value));
-    let from_start =
-        |value: &dyn Fn(&Trace) -> f64| mean(traces.iter().filter(|t| t.start == 0.0).map(value));
+    let from_start = |value: &dyn Fn(&Trace) -> f64| {
+        mean(
+            traces
+                .iter()
+                .filter(|t| t.start == Start::At(0.0))
+                .map(value),
+        )
+    };
     let frames = || traces.iter().flat_map(|t| &t.frames);
     let per_frame = |value: &dyn Fn(&Frame) -> f64| mean(frames().map(value));
     let largest_momentum = traces
@@ -78,6 +114,8 @@ pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
         }),
         root_rotation_turned_rad: from_start(&|t| turned(t, |f| &f.agent[0])),
         root_rotation_reference_rad: from_start(&|t| turned(t, |f| &f.reference.links[0])),
+        from_rest: None,
+        perturbed: None,
     }
 }
 

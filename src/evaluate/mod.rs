@@ -5,10 +5,11 @@ mod metrics;
 #[cfg(test)]
 mod tests;
 
-pub use episode::{Frame, Trace, play};
-pub use metrics::{Evaluation, measure};
+pub use episode::{Frame, Start, Trace, play};
+pub use metrics::{Digest, Evaluation, measure};
 
 use crate::learn::{LearnError, Performer};
+use crate::task::Perturbations;
 use rayon::prelude::*;
 
 /// What to evaluate.
@@ -18,18 +19,22 @@ pub struct Options {
     pub episodes: usize,
     /// Length of an episode of a wrapping motion, seconds; an ending motion is played to its end.
     pub seconds: f64,
+    /// Play the same phases a second time, disturbed like this; the number of the phase says how.
+    pub perturbations: Option<Perturbations>,
 }
 
 impl Default for Options {
     fn default() -> Self {
         Self {
-            episodes: 16,
+            episodes: 32,
             seconds: 20.0,
+            perturbations: None,
         }
     }
 }
 
-/// Plays deterministic episodes from evenly spread phases of reference number `which` and measures them.
+/// Plays deterministic episodes from evenly spread phases of reference number `which`, and one from rest, and measures
+/// them.
 ///
 /// Episodes are played in parallel and gathered in order.
 ///
@@ -40,16 +45,24 @@ pub fn evaluate(
     which: usize,
     options: &Options,
 ) -> Result<Evaluation, LearnError> {
-    let traces: Result<Vec<Trace>, LearnError> = (0..options.episodes.max(1))
+    let count = options.episodes.max(1);
+    let phases = (0..count).map(|n| (Start::At(n as f64 / count as f64), None));
+    let rest = (Start::Rest, None);
+    let disturbed = options.perturbations.into_iter().flat_map(|ranges| {
+        (0..count).map(move |n| (Start::At(n as f64 / count as f64), Some((ranges, n as u64))))
+    });
+    let all: Vec<_> = phases.chain([rest]).chain(disturbed).collect();
+    let traces: Result<Vec<Trace>, LearnError> = all
         .into_par_iter()
-        .map(|n| {
-            play(
-                performer,
-                which,
-                n as f64 / options.episodes.max(1) as f64,
-                options.seconds,
-            )
-        })
+        .map(|(start, disturbed)| play(performer, which, start, options.seconds, disturbed))
         .collect();
-    Ok(measure(performer.stage(), &traces?))
+    let traces = traces?;
+    let (undisturbed, disturbed) = traces.split_at(count + 1);
+    let stage = performer.stage();
+    let digest = |traces: &[Trace]| Digest::from(&measure(stage, traces));
+    Ok(Evaluation {
+        from_rest: Some(digest(&undisturbed[count..])),
+        perturbed: (!disturbed.is_empty()).then(|| digest(disturbed)),
+        ..measure(stage, &undisturbed[..count])
+    })
 }

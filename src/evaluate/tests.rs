@@ -1,6 +1,6 @@
 //! Metrics of made-up traces against what their definitions say.
 
-use super::episode::{Frame, Trace};
+use super::episode::{Frame, Start, Trace};
 use super::measure;
 use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
@@ -52,6 +52,7 @@ fn trace(stage: &Stage, start: f64, change: impl Fn(usize, &mut Frame)) -> Trace
                 dynamics: Dynamics::default(),
                 contacts: vec![true, true],
                 phase: 0.0,
+                anchor: Isometry3::identity(),
             },
             dynamics: Dynamics::default(),
             contacts: vec![true, true],
@@ -62,7 +63,7 @@ fn trace(stage: &Stage, start: f64, change: impl Fn(usize, &mut Frame)) -> Trace
         frame
     });
     Trace {
-        start,
+        start: Start::At(start),
         control_hz: 10.0,
         frames: frames.collect(),
         possible: 10,

@@ -1,6 +1,6 @@
-//! The Adam optimiser with global-norm clipping.
+//! Adam, or plain momentum, with global-norm clipping.
 
-use super::kernels::{AdamStep, Scalar, adam};
+use super::kernels::{AdamStep, MomentumStep, Scalar, adam, momentum_step};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -26,10 +26,24 @@ impl Default for AdamConfig {
     }
 }
 
+/// How a step is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rule {
+    pub adam: AdamConfig,
+    /// Plain gradient descent with this momentum, m ← μ·m + g and θ ← θ − α·m, instead of Adam.
+    pub momentum: Option<f64>,
+    /// Euclidean norm that the whole gradient is clipped to.
+    pub max_norm: f64,
+    pub learning_rate: f64,
+    /// First parameter that has the critic's rate instead.
+    pub critic_from: usize,
+    pub critic_learning_rate: f64,
+}
+
 /// The optimiser's state, element by element beside the parameter vector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam<T> {
-    /// Running mean of the gradient.
+    /// Running mean of the gradient; under plain momentum its running sum.
     pub mean: Vec<T>,
     /// Running mean of the squared gradient.
     pub square: Vec<T>,
@@ -46,35 +60,46 @@ impl<T: Scalar> Adam<T> {
         }
     }
 
-    /// One step on `parameters`, the gradient scaled down first so that its Euclidean `norm` is at most `max_norm`.
-    pub fn step(
-        &mut self,
-        config: &AdamConfig,
-        learning_rate: f64,
-        max_norm: f64,
-        parameters: &mut [T],
-        gradient: &[T],
-        norm: f64,
-    ) {
+    /// One step on `parameters`, the gradient scaled down first so that its Euclidean `norm` is at most that of the rule.
+    pub fn step(&mut self, rule: &Rule, parameters: &mut [T], gradient: &[T], norm: f64) {
         self.steps = self.steps.saturating_add(1);
-        let step = self.coefficients(
-            config,
-            learning_rate,
-            if norm > max_norm {
-                max_norm / norm
-            } else {
-                1.0
-            },
-        );
-        let pieces = parameters
-            .par_chunks_mut(PIECE)
-            .zip(self.mean.par_chunks_mut(PIECE));
-        pieces
-            .zip(self.square.par_chunks_mut(PIECE))
-            .zip(gradient.par_chunks(PIECE))
-            .for_each(|(((parameters, mean), square), gradient)| {
-                adam(parameters, mean, square, gradient, step)
-            });
+        let scale = if norm > rule.max_norm {
+            rule.max_norm / norm
+        } else {
+            1.0
+        };
+        let at = rule.critic_from.min(parameters.len());
+        let rates = [rule.learning_rate, rule.critic_learning_rate];
+        for (range, rate) in [0..at, at..parameters.len()].into_iter().zip(rates) {
+            let (parameters, gradient) = (&mut parameters[range.clone()], &gradient[range.clone()]);
+            match rule.momentum {
+                Some(momentum) => {
+                    let step = MomentumStep {
+                        gradient_scale: T::from_f64(scale),
+                        momentum: T::from_f64(momentum),
+                        step_size: T::from_f64(rate),
+                    };
+                    let mean = self.mean[range].par_chunks_mut(PIECE);
+                    let pieces = parameters.par_chunks_mut(PIECE).zip(mean);
+                    pieces.zip(gradient.par_chunks(PIECE)).for_each(
+                        |((parameters, mean), gradient)| {
+                            momentum_step(parameters, mean, gradient, step)
+                        },
+                    );
+                }
+                None => {
+                    let step = self.coefficients(&rule.adam, rate, scale);
+                    let mean = self.mean[range.clone()].par_chunks_mut(PIECE);
+                    let pieces = parameters.par_chunks_mut(PIECE).zip(mean);
+                    pieces
+                        .zip(self.square[range].par_chunks_mut(PIECE))
+                        .zip(gradient.par_chunks(PIECE))
+                        .for_each(|(((parameters, mean), square), gradient)| {
+                            adam(parameters, mean, square, gradient, step)
+                        });
+                }
+            }
+        }
     }
 
     /// `α·m̂/(√v̂ + ε)` with both bias corrections moved into α and ε (Kingma & Ba 2015, end of section 2).
@@ -103,6 +128,34 @@ impl<T: Scalar> Adam<T> {
 mod tests {
     use super::*;
 
+    fn rule(learning_rate: f64, critic_learning_rate: f64) -> Rule {
+        Rule {
+            adam: AdamConfig::default(),
+            momentum: None,
+            max_norm: 1.0,
+            learning_rate,
+            critic_from: 1,
+            critic_learning_rate,
+        }
+    }
+
+    /// Heavy-ball steps from m = 0 along constant gradients: after two, each parameter has moved by α·g·(2 + μ).
+    #[test]
+    fn momentum_adds_up_and_the_critic_has_its_own_rate() {
+        let mut parameters = [1.0, 2.0];
+        let mut optimiser = Adam::new(2);
+        let rule = Rule {
+            momentum: Some(0.9),
+            ..rule(0.01, 0.1)
+        };
+        for _ in 0..2 {
+            optimiser.step(&rule, &mut parameters, &[0.6, -0.8], 1.0);
+        }
+        let moved: [f64; 2] = [0.01 * 0.6 * 2.9, -0.1 * 0.8 * 2.9];
+        assert!((parameters[0] - (1.0 - moved[0])).abs() < 1e-15);
+        assert!((parameters[1] - (2.0 - moved[1])).abs() < 1e-15);
+    }
+
     #[test]
     fn two_steps_follow_the_published_algorithm() {
         let (a, b1, b2, eps) = (0.01, 0.9, 0.999, 1e-8);
@@ -122,14 +175,7 @@ mod tests {
         let mut parameters = [1.0, 2.0];
         let mut optimiser = Adam::new(2);
         for (gradient, norm) in gradients.iter().zip([5.0, 1.0]) {
-            optimiser.step(
-                &AdamConfig::default(),
-                a,
-                1.0,
-                &mut parameters,
-                gradient,
-                norm,
-            );
+            optimiser.step(&rule(a, a), &mut parameters, gradient, norm);
         }
         for i in 0..2 {
             assert!((parameters[i] - theta[i]).abs() < 1e-14);

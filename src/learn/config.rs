@@ -44,6 +44,12 @@ pub struct Config {
     pub learn_std: bool,
     /// Whether the critic learns returns on a running scale (see [`super::Learner`]).
     pub normalize_returns: bool,
+    /// Normalised advantages are cut off beyond ± this; `null` keeps them all.
+    pub advantage_limit: Option<f64>,
+    /// Learning rate of the critic at the start; `null` gives it the actor's.
+    pub critic_learning_rate: Option<f64>,
+    /// Gradient descent with this momentum instead of Adam; `null` is Adam.
+    pub momentum: Option<f64>,
     pub adam: AdamConfig,
 }
 
@@ -69,6 +75,9 @@ impl Default for Config {
             initial_std: 0.5,
             learn_std: false,
             normalize_returns: true,
+            advantage_limit: None,
+            critic_learning_rate: None,
+            momentum: None,
             adam: AdamConfig::default(),
         }
     }
@@ -148,6 +157,24 @@ impl Config {
                 self.target_kl.unwrap_or(1.0),
                 &positive,
                 "the positive numbers",
+            ),
+            (
+                "advantage_limit",
+                self.advantage_limit.unwrap_or(1.0),
+                &positive,
+                "the positive numbers",
+            ),
+            (
+                "critic_learning_rate",
+                self.critic_learning_rate.unwrap_or(1.0),
+                &positive,
+                "the positive numbers",
+            ),
+            (
+                "momentum",
+                self.momentum.unwrap_or(0.0),
+                &decay,
+                "0 up to below 1",
             ),
             (
                 "stop_kl_factor",

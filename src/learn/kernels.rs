@@ -294,6 +294,25 @@ vectorised! {
     }
 }
 
+/// The numbers that one step of plain momentum needs.
+#[derive(Clone, Copy)]
+pub(crate) struct MomentumStep<T> {
+    /// What the gradient is multiplied by first (clipping).
+    pub(crate) gradient_scale: T,
+    pub(crate) momentum: T,
+    pub(crate) step_size: T,
+}
+
+vectorised! {
+    /// One step of gradient descent with momentum on a piece of the parameter vector.
+    fn momentum_step(parameters: &mut [T], sum: &mut [T], gradient: &[T], step: MomentumStep<T>) {
+        for ((p, m), &g) in parameters.iter_mut().zip(sum).zip(gradient) {
+            *m = step.momentum * *m + step.gradient_scale * g;
+            *p = *p - step.step_size * *m;
+        }
+    }
+}
+
 vectorised! {
     /// `out = clamp((raw − mean) · inverse_deviation, ±limit)`, row by row; a NaN stays.
     fn standardise(raw: &[T], mean: &[T], inverse_deviation: &[T], limit: T, out: &mut [T]) {

@@ -1,6 +1,6 @@
 //! Proximal policy optimisation: the learner's state and its update.
 
-use super::adam::{Adam, PIECE};
+use super::adam::{Adam, PIECE, Rule};
 use super::batch::{Batch, even_parts, shuffled};
 use super::config::Config;
 use super::kernels::{Scalar, add, sum_of_squares};
@@ -108,6 +108,11 @@ impl<T: Scalar> Learner<T> {
         self.state.parameters[range].fill(T::from_f64(std.ln()));
     }
 
+    /// Sets the learning rate, for one that follows a schedule.
+    pub fn set_learning_rate(&mut self, rate: f64) {
+        self.state.learning_rate = rate;
+    }
+
     /// Learns from a batch; `rng` shuffles it. Runs on the current rayon pool with the same bits at any size of it.
     pub fn update(
         &mut self,
@@ -190,6 +195,12 @@ impl<T: Scalar> Learner<T> {
                 .iter()
                 .map(|a| standardise(a, mean, std.max(1e-8))),
         );
+        if let Some(limit) = self.config.advantage_limit.map(T::from_f64) {
+            for a in &mut self.advantages {
+                *a = if *a > limit { limit } else { *a };
+                *a = if *a < -limit { -limit } else { *a };
+            }
+        }
         let mean = self.state.parameters[self.policy.value_mean_index()].to_f64();
         let std = self.state.parameters[self.policy.value_std_index()].to_f64();
         self.targets.clear();
@@ -250,25 +261,23 @@ impl<T: Scalar> Learner<T> {
     }
 
     fn step(&mut self, norm: f64) {
-        let LearnerState {
-            parameters,
-            adam,
-            learning_rate,
-            ..
-        } = &mut self.state;
-        let Config {
-            adam: config,
-            max_gradient_norm,
-            ..
-        } = &self.config;
-        adam.step(
-            config,
-            *learning_rate,
-            *max_gradient_norm,
-            parameters,
-            &self.gradient,
-            norm,
-        );
+        let (config, rate) = (&self.config, self.state.learning_rate);
+        // Where the actor's rate moves, the critic's moves with it.
+        let critic = config
+            .critic_learning_rate
+            .map_or(rate, |critic| critic * (rate / config.learning_rate));
+        let rule = Rule {
+            adam: config.adam,
+            momentum: config.momentum,
+            max_norm: config.max_gradient_norm,
+            learning_rate: rate,
+            critic_from: self.policy.critic_range().start,
+            critic_learning_rate: critic,
+        };
+        let state = &mut self.state;
+        state
+            .adam
+            .step(&rule, &mut state.parameters, &self.gradient, norm);
     }
 
     fn summary(&self, run: &Run, batch: &Batch<T>) -> UpdateStats {

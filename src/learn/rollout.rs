@@ -233,6 +233,9 @@ impl Player {
             0.0
         };
         self.env.reset(share * self.env.last_start());
+        if self.env.is_perturbed() {
+            self.env.perturb(self.rng.next_u64());
+        }
         self.episode = Episode {
             possible: self.env.possible_steps(),
             ..Episode::default()

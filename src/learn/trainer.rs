@@ -2,8 +2,8 @@
 
 use super::rollout::{Actor, Buffer, Episode, Group, stream};
 use super::{
-    Batch, Config, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT, PolicySpec,
-    Trajectories, UpdateStats, advantages,
+    Activation, Batch, Config, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT,
+    PolicySpec, Trajectories, UpdateStats, advantages,
 };
 use crate::motion::Motion;
 use crate::task::{Block, Reference, Setting, Stage, TERM_NAMES, TaskError, layout};
@@ -21,6 +21,8 @@ pub struct Plan {
     pub ppo: Config,
     /// Widths of the hidden layers of actor and critic.
     pub hidden: Vec<usize>,
+    /// What follows every hidden layer.
+    pub activation: Activation,
     /// Environments that act side by side.
     pub environments: usize,
     /// Environments that share a network call.
@@ -34,6 +36,9 @@ pub struct Plan {
     pub samples: u64,
     /// Action noise at the end, as a share of that at the start; it shrinks evenly over the samples.
     pub final_std: f64,
+    /// Learning rate at the end, as a share of that at the start, where no KL steers it; it changes evenly over the
+    /// samples.
+    pub final_learning_rate: f64,
 }
 
 impl Default for Plan {
@@ -43,12 +48,14 @@ impl Default for Plan {
             task: Setting::default(),
             ppo: Config::default(),
             hidden: vec![256, 128],
+            activation: Activation::Relu,
             environments: 64,
             group: 8,
             horizon: 64,
             round: 20,
             samples: 4_000_000,
             final_std: 0.4,
+            final_learning_rate: 1.0,
         }
     }
 }
@@ -73,6 +80,9 @@ impl Plan {
         if !(self.final_std > 0.0 && self.final_std.is_finite()) {
             return Err(TrainError::FinalStd(self.final_std));
         }
+        if !(0.0..=1.0).contains(&self.final_learning_rate) {
+            return Err(TrainError::FinalRate(self.final_learning_rate));
+        }
         Ok(self.task.check()?)
     }
 }
@@ -96,6 +106,10 @@ pub enum TrainError {
         "final_std is {0}, and must be positive: it is the share of the action noise that is left at the end"
     )]
     FinalStd(f64),
+    #[error(
+        "final_learning_rate is {0}, and must be 0 to 1: it is the share of the learning rate that is left at the end"
+    )]
+    FinalRate(f64),
     #[error("there is no motion to learn")]
     NoMotion,
 }
@@ -166,12 +180,12 @@ impl Trainer {
             .collect();
         let references = references?;
         let contacts = contacts(&references)?;
-        let observation = layout(&stage, contacts);
+        let observation = layout(plan.task.observations, &stage, contacts);
         let spec = PolicySpec {
             observation: observation.iter().map(|block| block.size).sum(),
             action: stage.character.dof,
             hidden: plan.hidden.clone(),
-            activation: Default::default(),
+            activation: plan.activation,
         };
         let learner = Learner::new(plan.ppo.clone(), spec, &mut stream(plan.seed, 0, 0))?;
         let stage = Arc::new(stage);
@@ -258,6 +272,7 @@ impl Trainer {
     /// # Errors
     /// A quantity that stopped being finite.
     pub fn iterate(&mut self) -> Result<Metrics, LearnError> {
+        self.schedule_rate();
         let std = self.schedule_noise();
         if self.normalizer.count == 0.0 {
             self.meet_observations()?;
@@ -283,8 +298,22 @@ impl Trainer {
         Ok(self.metrics(update, std))
     }
 
+    /// Share of the plan's samples that are used up.
+    fn done(&self) -> f64 {
+        (self.samples() as f64 / self.plan.samples.max(1) as f64).min(1.0)
+    }
+
+    fn schedule_rate(&mut self) {
+        if self.plan.ppo.target_kl.is_some() {
+            return;
+        }
+        let share = 1.0 + (self.plan.final_learning_rate - 1.0) * self.done();
+        self.learner
+            .set_learning_rate(self.plan.ppo.learning_rate * share);
+    }
+
     fn schedule_noise(&mut self) -> f64 {
-        let done = (self.samples() as f64 / self.plan.samples.max(1) as f64).min(1.0);
+        let done = self.done();
         let std = self.plan.ppo.initial_std * (1.0 + (self.plan.final_std - 1.0) * done);
         if self.plan.ppo.learn_std {
             return self.learner.mean_std();
@@ -376,7 +405,9 @@ impl Trainer {
             (!episodes.is_empty()).then(|| sum / episodes.len() as f64)
         };
         let steps = buffers().map(|b| b.ends.len()).sum::<usize>().max(1) as f64;
-        let reward_terms = TERM_NAMES.iter().enumerate().map(|(i, name)| {
+        let has = self.plan.task.rewards.kernels.has();
+        let terms = TERM_NAMES.iter().enumerate().filter(|(i, _)| has[*i]);
+        let reward_terms = terms.map(|(i, name)| {
             let sum: f64 = buffers().map(|b| b.terms[i]).sum();
             ((*name).to_owned(), sum / steps)
         });

@@ -374,3 +374,41 @@ fn a_world_that_runs_away_is_told() {
     world.reset(&standing(&character, 1.0));
     assert_eq!(world.step(), Ok(()), "a reset world works again");
 }
+
+/// In flight an impulse is the change of the whole character's momentum, whatever its joints do with it; of twice the
+/// mass the velocities change by half.
+#[test]
+fn a_push_is_a_change_of_momentum() {
+    let character = humanoid();
+    let states = standing(&character, 50.0);
+    let impulse = Vector3::new(20.0, -10.0, 0.0);
+    let pushed = |mass: f32| {
+        let mut world = World::new(&character, Settings::default());
+        world.reset(&states);
+        world.vary(mass, 1.0);
+        world.set_targets(&held(&character));
+        world.step().expect("free flight stays finite");
+        let (before, _, _) = momenta(&character, world.states());
+        world.push(1, impulse);
+        world.step().expect("free flight stays finite");
+        momenta(&character, world.states()).0 - before
+    };
+    for (mass, share) in [(1.0, 1.0), (2.0, 0.5)] {
+        let change = pushed(mass);
+        let expected = impulse.cast::<f64>() * share;
+        assert!(
+            (change.xy() - expected.xy()).norm() < 1e-3 * expected.norm(),
+            "{change:?}, not {expected:?}, of {mass} times the mass"
+        );
+    }
+    let mut world = World::new(&character, Settings::default());
+    world.vary(2.0, 0.3);
+    world.reset(&states);
+    world.set_targets(&held(&character));
+    let mut fresh = World::new(&character, Settings::default());
+    fresh.reset(&states);
+    fresh.set_targets(&held(&character));
+    world.step().expect("it stays finite");
+    fresh.step().expect("it stays finite");
+    assert_eq!(world.states(), fresh.states(), "a reset forgets it");
+}

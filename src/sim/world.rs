@@ -3,7 +3,7 @@
 use super::build::{self, Built, Scene};
 use super::character::Character;
 use super::{Diverged, Settings, convert};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
 
 /// Where a link is and how it moves.
@@ -44,6 +44,8 @@ pub struct World {
     frames: Vec<(UnitQuaternion<f32>, UnitQuaternion<f32>)>,
     ground: ColliderHandle,
     coms: Vec<Vector3<f32>>,
+    /// Per link, as built: mass and inertia about the centre of mass.
+    masses: Vec<(f32, Matrix3<f32>)>,
     states: Vec<LinkState>,
     contacts: Vec<bool>,
 }
@@ -80,6 +82,11 @@ impl World {
                 .collect(),
             ground,
             coms: character.links.iter().map(|link| link.com.cast()).collect(),
+            masses: character
+                .links
+                .iter()
+                .map(|link| (link.mass as f32, link.inertia.cast()))
+                .collect(),
             states: vec![at_rest; bodies.len()],
             contacts: vec![false; bodies.len()],
             bodies,
@@ -106,6 +113,32 @@ impl World {
         }
         self.states.copy_from_slice(states);
         self.contacts.fill(false);
+    }
+
+    /// Until the next reset all masses and inertias are `mass` times what they are, and friction `friction` times.
+    pub fn vary(&mut self, mass: f32, friction: f32) {
+        for ((handle, (own, inertia)), com) in self.bodies.iter().zip(&self.masses).zip(&self.coms)
+        {
+            let scaled = MassProperties::with_inertia_matrix(
+                convert::vector(*com),
+                own * mass,
+                convert::matrix(&(inertia * mass)),
+            );
+            self.scene.bodies[*handle].set_additional_mass_properties(scaled, false);
+        }
+        for (_, collider) in self.scene.colliders.iter_mut() {
+            collider.set_friction(collider.friction() * friction);
+        }
+    }
+
+    /// Gives a link an impulse at its centre of mass, world axes, N·s. Its mass is that of the last step.
+    pub fn push(&mut self, link: usize, impulse: Vector3<f32>) {
+        let body = &mut self.scene.bodies[self.bodies[link]];
+        let mass = body.mass();
+        if mass > 0.0 {
+            let velocity = body.linvel() + convert::vector(impulse / mass);
+            body.set_linvel(velocity, true);
+        }
     }
 
     /// Sets what the drives hold until the next call; one target per link.

@@ -1,9 +1,11 @@
 //! Phase-based imitation: one environment.
 
-use super::observe::{observation_size, observe};
+use super::observe::{Scene, observation_size, observe};
+use super::perturb::Disturbance;
 use super::reference::{Reference, Sample};
 use super::reward::{Terms, terms};
-use super::setting::{Actions, Setting, Stage};
+use super::setting::{Actions, Setting};
+use super::stage::Stage;
 use super::terminate::{Failure, failure};
 use crate::clip::LoopMode;
 use crate::sim::{HingeAxis, LinkJoint, LinkState, Target, World};
@@ -45,8 +47,10 @@ pub struct Imitate {
     next: Sample,
     dynamics: Dynamics,
     targets: Vec<Target>,
+    last_action: Vec<f32>,
     /// Per contact link of the reference.
     touching: Vec<bool>,
+    disturbance: Option<Disturbance>,
 }
 
 impl Imitate {
@@ -55,7 +59,9 @@ impl Imitate {
             world: World::new(&stage.character, setting.physics),
             next: reference.blank(),
             targets: vec![Target::Free; stage.character.links.len()],
+            last_action: vec![0.0; stage.character.dof],
             touching: Vec::new(),
+            disturbance: None,
             stage,
             reference,
             setting: *setting,
@@ -68,7 +74,11 @@ impl Imitate {
     }
 
     pub fn observation_size(&self) -> usize {
-        observation_size(&self.stage, self.reference.contact_links.len())
+        observation_size(
+            self.setting.observations,
+            &self.stage,
+            self.reference.contact_links.len(),
+        )
     }
 
     pub fn action_size(&self) -> usize {
@@ -84,7 +94,48 @@ impl Imitate {
         self.dynamics = self.reference.masses().dynamics(self.world.states());
         // The engine finds contacts only in a step; until then the agent touches what its reference does.
         self.touching.clone_from(&self.next.contacts);
+        self.last_action.fill(0.0);
+        self.disturbance = None;
         self.look_ahead();
+    }
+
+    /// Starts an episode at the reference's first frame, but at rest: in the rest pose, on the ground where the
+    /// reference's root is, facing where it faces.
+    pub fn reset_at_rest(&mut self) {
+        self.reset(0.0);
+        let skeleton = &self.stage.skeleton;
+        let poses = skeleton.forward(&skeleton.rest_qpos());
+        let raise = nalgebra::Translation3::new(0.0, 0.0, -skeleton.lowest_point(&poses) as f32);
+        let root = poses[0].translation.vector;
+        let center = nalgebra::Translation3::new(-root.x as f32, -root.y as f32, 0.0);
+        let place = raise * self.next.anchor * center;
+        let still = |body: usize| LinkState {
+            pose: place * poses[body].cast::<f32>(),
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+        };
+        let links = self.stage.character.links.iter();
+        let states: Vec<LinkState> = links.map(|link| still(link.body)).collect();
+        let lowest = skeleton.lowest_point(&poses);
+        let stands = |link: &usize| {
+            let body = self.stage.character.links[*link].body;
+            skeleton.lowest_point_of(&poses, &[body]) < lowest + STANDING
+        };
+        self.touching = self.reference.contact_links.iter().map(stands).collect();
+        self.world.reset(&states);
+        self.dynamics = self.reference.masses().dynamics(&states);
+    }
+
+    /// Whether the task has disturbances, which [`Imitate::perturb`] starts.
+    pub fn is_perturbed(&self) -> bool {
+        self.setting.perturbations.is_on()
+    }
+
+    /// Disturbs the episode that was just begun; `seed` alone says how.
+    pub fn perturb(&mut self, seed: u64) {
+        let disturbance = Disturbance::new(self.setting.perturbations, seed);
+        self.world.vary(disturbance.mass, disturbance.friction);
+        self.disturbance = Some(disturbance);
     }
 
     /// Latest start that leaves something to do, seconds.
@@ -111,19 +162,21 @@ impl Imitate {
 
     /// Writes what the policy sees.
     pub fn observe(&self, out: &mut [f32]) {
-        observe(
-            &self.stage,
-            self.world.states(),
-            &self.dynamics,
-            &self.touching,
-            &self.next,
-            out,
-        );
+        let scene = Scene {
+            links: self.world.states(),
+            dynamics: &self.dynamics,
+            contacts: &self.touching,
+            last_action: &self.last_action,
+            next: &self.next,
+        };
+        observe(self.setting.observations, &self.stage, &scene, out);
     }
 
     /// Advances by one control step under `action`.
     pub fn step(&mut self, action: &[f32]) -> Step {
         self.aim(action);
+        self.last_action.copy_from_slice(action);
+        self.shove();
         let stepped = self.world.step();
         self.time += self.setting.physics.control_dt();
         if stepped.is_err() {
@@ -140,6 +193,7 @@ impl Imitate {
         self.touching.extend(links.map(|&link| pressed[link]));
         self.dynamics = self.reference.masses().dynamics(states);
         let terms = terms(
+            self.setting.rewards.kernels,
             &self.stage,
             (states, &self.dynamics),
             (&self.next.links, &self.next.dynamics),
@@ -168,9 +222,30 @@ impl Imitate {
         &self.dynamics
     }
 
+    /// Per contact link of the reference: whether the agent presses on the ground with it.
+    pub fn touching(&self) -> &[bool] {
+        &self.touching
+    }
+
+    /// What the drives are aimed at, one per link.
+    pub fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+
     /// Time in the reference, seconds.
     pub fn time(&self) -> f64 {
         self.time
+    }
+
+    fn shove(&mut self) {
+        let elapsed = self.time - self.started;
+        let push = self.disturbance.as_mut().and_then(|d| d.push(elapsed));
+        if let Some(change) = push {
+            let trunk = self.stage.chest_body.unwrap_or(0);
+            let link = self.stage.character.bodies[trunk].0;
+            let mass = self.stage.skeleton.total_mass() as f32;
+            self.world.push(link, change * mass);
+        }
     }
 
     fn look_ahead(&mut self) {
@@ -204,7 +279,12 @@ impl Imitate {
             let part = &action[link.dof..link.dof + link.joint.dof()];
             self.targets[i] = match self.setting.actions {
                 Actions::Residual { scale } => self.residual(i, parent, part, scale),
-                Actions::Absolute { reach } => absolute(&link.joint, part, reach),
+                Actions::Absolute { reach } => absolute(&link.joint, part, |[low, high], a| {
+                    (low + high) / 2.0 + a * reach * (high - low) / 2.0
+                }),
+                Actions::FromRest { reach } => absolute(&link.joint, part, |[low, high], a| {
+                    a * reach * low.abs().max(high.abs())
+                }),
             };
         }
         self.world.set_targets(&self.targets);
@@ -236,16 +316,23 @@ impl Imitate {
                 let direction = axis.direction.cast::<f32>();
                 let lead = lag(drive) * rate.dot(&direction);
                 let angle = turn.scaled_axis().dot(&direction) + lead + action[0] * scale;
-                let [low, high] = axis.limit.map(|end| end as f32);
-                Target::Hinge(angle.clamp(low - BEYOND_LIMIT, high + BEYOND_LIMIT))
+                Target::Hinge(within_reach(axis, angle))
             }
         }
     }
 }
 
+/// A body this little above the lowest one stands with it, metres.
+const STANDING: f64 = 0.01;
+
 /// How far beyond a hinge's range its drive may aim, radians: to press against the end of the range, or to hold a
 /// load near it. `skeletons/humanoid.xml` has the same in its control ranges.
 const BEYOND_LIMIT: f32 = 0.5;
+
+fn within_reach(axis: &HingeAxis, angle: f32) -> f32 {
+    let [low, high] = axis.limit.map(|end| end as f32);
+    angle.clamp(low - BEYOND_LIMIT, high + BEYOND_LIMIT)
+}
 
 /// Rotation vector in the link's frame that the action of a joint with several coordinates stands for.
 fn turned(joint: &LinkJoint, action: &[f32]) -> Vector3<f32> {
@@ -268,21 +355,22 @@ fn lag(drive: &Drive) -> f32 {
     }
 }
 
-fn absolute(joint: &LinkJoint, action: &[f32], reach: f32) -> Target {
-    let place = |limit: &[f64; 2], a: f32| {
-        let (middle, half) = ((limit[0] + limit[1]) / 2.0, (limit[1] - limit[0]) / 2.0);
-        middle as f32 + a * reach * half as f32
-    };
+/// Where `place` puts each coordinate, given its range and the action.
+fn absolute(joint: &LinkJoint, action: &[f32], place: impl Fn([f32; 2], f32) -> f32) -> Target {
+    let place = |limit: &[f64; 2], a: f32| place(limit.map(|end| end as f32), a);
     match joint {
         LinkJoint::Free => Target::Free,
-        LinkJoint::Hinge { axis, .. } => Target::Hinge(place(&axis.limit, action[0])),
+        LinkJoint::Hinge { axis, .. } => {
+            Target::Hinge(within_reach(axis, place(&axis.limit, action[0])))
+        }
         LinkJoint::Ball { limits, .. } => {
             let v = Vector3::from_fn(|k, _| place(&limits[k], action[k]));
             Target::Ball(UnitQuaternion::from_scaled_axis(v))
         }
         LinkJoint::Hinges { hinges, .. } => {
             let turn = |(hinge, a): (&HingeAxis, &f32)| {
-                UnitQuaternion::from_scaled_axis(hinge.direction.cast() * place(&hinge.limit, *a))
+                let angle = within_reach(hinge, place(&hinge.limit, *a));
+                UnitQuaternion::from_scaled_axis(hinge.direction.cast() * angle)
             };
             let turns = hinges.iter().zip(action).map(turn);
             Target::Ball(turns.fold(UnitQuaternion::identity(), |all, next| all * next))

@@ -6,17 +6,21 @@
 mod dynamics;
 mod imitate;
 mod observe;
+mod perturb;
 mod reference;
 mod reward;
 mod setting;
+mod stage;
 mod terminate;
 #[cfg(test)]
 mod tests;
 
 pub use dynamics::Dynamics;
 pub use imitate::{Imitate, Outcome, Step};
-pub use observe::{Block, layout, observation_size};
+pub use observe::{Block, Scene, layout, observation_size, observe};
+pub use perturb::Perturbations;
 pub use reference::{Reference, Sample};
-pub use reward::{TERM_NAMES, Terms};
-pub use setting::{Actions, Rewards, Setting, Stage, TaskError, Terminations};
+pub use reward::{Kernels, TERM_NAMES, Terms};
+pub use setting::{Actions, Observations, Rewards, Setting, TaskError, Terminations};
+pub use stage::{SolePoint, Stage};
 pub use terminate::Failure;

@@ -1,11 +1,12 @@
 //! The reference motion as link states, at any time.
 
 use super::dynamics::{Dynamics, Masses};
-use super::setting::{Stage, TaskError};
+use super::setting::TaskError;
+use super::stage::Stage;
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Link states between the table's frames are blended link by link, which shortens a limb that turns at ω by
 /// 1 − cos(ω/2f): at 120 Hz and 12 rad/s by a half per mille, in a table of a clip's own 16 Hz by 7 %.
@@ -21,6 +22,9 @@ pub struct Sample {
     pub contacts: Vec<bool>,
     /// 0 at the first frame of a cycle, 1 at its last.
     pub phase: f32,
+    /// Where this cycle began: the root's place on the ground at its first frame, and its heading there. World from
+    /// anchor.
+    pub anchor: Isometry3<f32>,
 }
 
 /// A motion ready to be imitated.
@@ -33,6 +37,8 @@ pub struct Reference {
     duration: f64,
     /// Link states, frame after frame.
     frames: Vec<Vec<LinkState>>,
+    /// Anchor of the first cycle.
+    start: Isometry3<f32>,
     contacts: Vec<Vec<bool>>,
     cycle: Cycle,
     masses: Masses,
@@ -53,19 +59,21 @@ impl Reference {
         }
         let finer = (TABLE_HZ / motion.fps).ceil().max(1.0);
         let rate = motion.fps * finer;
-        let frames = (motion.qpos.len() - 1) * finer as usize + 1;
+        let count = (motion.qpos.len() - 1) * finer as usize + 1;
         let duration = motion.duration();
-        let times = || (0..frames).map(|f| (f as f64 / rate).min(duration));
+        let times = || (0..count).map(|f| (f as f64 / rate).min(duration));
         let contact = |time| {
             let bodies = 0..motion.contact_bodies.len();
             bodies.map(|c| motion.sample_contact(c, time)).collect()
         };
+        let frames: Vec<_> = times().map(|t| link_states(motion, stage, t)).collect();
         Ok(Reference {
             name: motion.name.clone(),
             rate,
             loop_mode: motion.loop_mode,
             duration,
-            frames: times().map(|t| link_states(motion, stage, t)).collect(),
+            start: anchor(&frames[0][0].pose),
+            frames,
             contacts: times().map(contact).collect(),
             cycle: motion.cycle,
             masses: Masses::new(&stage.character),
@@ -108,6 +116,7 @@ impl Reference {
             dynamics: Dynamics::default(),
             contacts: self.contacts[0].clone(),
             phase: 0.0,
+            anchor: self.start,
         }
     }
 
@@ -131,6 +140,7 @@ impl Reference {
         let nearest = if blend < 0.5 { frame } else { frame + 1 };
         sample.contacts.copy_from_slice(&self.contacts[nearest]);
         sample.phase = (within / self.duration) as f32;
+        sample.anchor = offset * self.start;
     }
 
     fn split(&self, time: f64) -> (i64, f64) {
@@ -145,6 +155,18 @@ impl Reference {
             }
         }
     }
+}
+
+/// The place on the ground below a pose, facing where its x axis does.
+fn anchor(pose: &Isometry3<f32>) -> Isometry3<f32> {
+    let at = pose.translation.vector;
+    Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), heading(&pose.rotation))
+}
+
+/// The part of a rotation about the vertical that carries x to where it points on the ground.
+pub(super) fn heading(turn: &UnitQuaternion<f32>) -> UnitQuaternion<f32> {
+    let forward = turn * Vector3::x();
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), forward.y.atan2(forward.x))
 }
 
 fn link_states(motion: &Motion, stage: &Stage, time: f64) -> Vec<LinkState> {

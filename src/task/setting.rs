@@ -1,9 +1,9 @@
-//! What a task can be told, and the stage on which it plays.
+//! What a task can be told.
 
-use crate::humanoid::Slot;
+use super::perturb::Perturbations;
+use super::reward::{Kernels, TERM_NAMES};
 use crate::motion::MotionError;
-use crate::sim::{Character, Settings, SimError};
-use crate::skeleton::Skeleton;
+use crate::sim::{Settings, SimError};
 use serde::{Deserialize, Serialize};
 
 /// What the network's output means.
@@ -13,22 +13,40 @@ pub enum Actions {
     /// Rotation added to the reference's own joint targets, `scale` radians for an output of one.
     Residual { scale: f32 },
     /// Exponential-map target itself: the middle of each coordinate's range for zero, its ends times `reach` for ±1.
+    /// A hinge is aimed at most half a radian beyond its range.
     Absolute { reach: f32 },
+    /// The same with the rest pose for zero, and `reach` times the further end of each coordinate's range for ±1.
+    FromRest { reach: f32 },
 }
 
 impl Actions {
     fn size(&self) -> f64 {
         match self {
             Actions::Residual { scale } => f64::from(*scale),
-            Actions::Absolute { reach } => f64::from(*reach),
+            Actions::Absolute { reach } | Actions::FromRest { reach } => f64::from(*reach),
         }
     }
 }
 
-/// Weights of the reward terms; their sum is the largest reward of a step. See [`super::Terms`].
+/// What the policy sees; see [`super::layout`] for the blocks of each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Observations {
+    /// Our own: the agent, its errors against the reference, and the phase, in the root's frame.
+    #[default]
+    Tracking,
+    /// Peng et al. 2018, "DeepMimic", section 4: all bodies in the heading frame, and the phase.
+    Deepmimic,
+    /// Booth & Ivanov 2020: all bodies, the last action, the centre of mass, angular momentum, soles, and the phase.
+    Booth2020,
+}
+
+/// Weights of the reward terms; what a step earns is divided by their sum. See [`super::Terms`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rewards {
+    /// Which errors the terms are made of.
+    pub kernels: Kernels,
     pub pose: f32,
     pub velocity: f32,
     pub position: f32,
@@ -36,11 +54,49 @@ pub struct Rewards {
     pub root_velocity: f32,
     pub com: f32,
     pub angular_momentum: f32,
+    pub end_effector: f32,
+    pub end_effector_velocity: f32,
+    pub com_position: f32,
+}
+
+impl Rewards {
+    /// In the order of [`TERM_NAMES`].
+    pub fn weights(&self) -> [f32; TERM_NAMES.len()] {
+        [
+            self.pose,
+            self.velocity,
+            self.position,
+            self.root,
+            self.root_velocity,
+            self.com,
+            self.angular_momentum,
+            self.end_effector,
+            self.end_effector_velocity,
+            self.com_position,
+        ]
+    }
+
+    /// A weight for a term that the kernels don't have would only make every reward smaller.
+    fn check(&self) -> Result<(), TaskError> {
+        let weights = self.weights().into_iter().zip(self.kernels.has());
+        match TERM_NAMES
+            .iter()
+            .zip(weights)
+            .find(|(_, (weight, has))| !has && *weight != 0.0)
+        {
+            Some((term, _)) => Err(TaskError::NoSuchTerm {
+                term,
+                kernels: self.kernels,
+            }),
+            None => Ok(()),
+        }
+    }
 }
 
 impl Default for Rewards {
     fn default() -> Self {
         Self {
+            kernels: Kernels::Tracking,
             pose: 0.3,
             velocity: 0.1,
             position: 0.25,
@@ -48,6 +104,9 @@ impl Default for Rewards {
             root_velocity: 0.1,
             com: 0.05,
             angular_momentum: 0.05,
+            end_effector: 0.0,
+            end_effector_velocity: 0.0,
+            com_position: 0.0,
         }
     }
 }
@@ -56,8 +115,8 @@ impl Default for Rewards {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Terminations {
-    /// A body further than this from its reference, metres.
-    pub distance: f32,
+    /// A body further than this from its reference, metres; `None` leaves the rule out.
+    pub distance: Option<f32>,
     /// A body that the reference never puts on the ground touches it.
     pub fall: bool,
     /// Reward of a step below this, as in the paper; `None` leaves the rule out.
@@ -67,7 +126,7 @@ pub struct Terminations {
 impl Default for Terminations {
     fn default() -> Self {
         Self {
-            distance: 0.5,
+            distance: Some(0.5),
             fall: true,
             reward: None,
         }
@@ -80,8 +139,11 @@ impl Default for Terminations {
 pub struct Setting {
     pub physics: Settings,
     pub actions: Actions,
+    pub observations: Observations,
     pub rewards: Rewards,
     pub terminations: Terminations,
+    /// What disturbs training.
+    pub perturbations: Perturbations,
     /// Start at any phase (reference state initialisation), not only at the first frame.
     pub start_anywhere: bool,
     /// Longest episode in training, seconds.
@@ -93,8 +155,10 @@ impl Default for Setting {
         Self {
             physics: Settings::default(),
             actions: Actions::Residual { scale: 0.3 },
+            observations: Observations::Tracking,
             rewards: Rewards::default(),
             terminations: Terminations::default(),
+            perturbations: Perturbations::default(),
             start_anywhere: true,
             episode_s: 10.0,
         }
@@ -105,16 +169,9 @@ impl Setting {
     /// # Errors
     /// A number that no task can have.
     pub fn check(&self) -> Result<(), TaskError> {
-        let w = &self.rewards;
-        let weights = [
-            w.pose,
-            w.velocity,
-            w.position,
-            w.root,
-            w.root_velocity,
-            w.com,
-            w.angular_momentum,
-        ];
+        self.rewards.check()?;
+        self.perturbations.check()?;
+        let weights = self.rewards.weights();
         let least = weights.iter().copied().fold(f32::INFINITY, f32::min);
         let physics = &self.physics;
         let positive = f64::MIN_POSITIVE..=1e6;
@@ -147,7 +204,7 @@ impl Setting {
             ),
             (
                 "the distance that ends an episode",
-                f64::from(self.terminations.distance),
+                f64::from(self.terminations.distance.unwrap_or(1.0)),
                 positive.clone(),
                 "positive",
             ),
@@ -191,53 +248,24 @@ pub enum TaskError {
         range: &'static str,
     },
     #[error(
+        "the reward term `{term}` has a weight, and the {kernels} kernels have no such term; set its weight to 0"
+    )]
+    NoSuchTerm {
+        term: &'static str,
+        kernels: Kernels,
+    },
+    #[error(
+        "{name} is a range that has {value} in it, and must be [least, most] from {least} to 100"
+    )]
+    Range {
+        name: &'static str,
+        value: f32,
+        least: f32,
+    },
+    #[error(
         "skeleton `{skeleton}` stands {leg} m tall from hip to sole, so its size can't be judged: give it slots for hips and legs"
     )]
     NoLegs { skeleton: String, leg: f64 },
     #[error("the motion has {frames} frame(s), and imitation needs at least two")]
     TooShort { frames: usize },
-}
-
-/// What every environment of a run shares: skeleton, character and the bodies of interest.
-#[derive(Clone, Debug)]
-pub struct Stage {
-    pub skeleton: Skeleton,
-    pub character: Character,
-    /// Bodies whose positions the observation holds: head, hands and feet where the skeleton has them.
-    pub key_bodies: Vec<usize>,
-    /// What divides angular momentum: mass × leg length × √(g × leg length), kg·m²/s.
-    pub momentum_scale: f32,
-}
-
-impl Stage {
-    /// # Errors
-    /// A skeleton that can't be simulated.
-    pub fn new(skeleton: Skeleton) -> Result<Self, TaskError> {
-        let character = Character::new(&skeleton)?;
-        let ends = [
-            Slot::Head,
-            Slot::LeftHand,
-            Slot::RightHand,
-            Slot::LeftFoot,
-            Slot::RightFoot,
-        ];
-        let key_bodies = ends
-            .iter()
-            .filter_map(|slot| skeleton.slots.get(slot).copied())
-            .collect();
-        let leg = skeleton.leg_length();
-        if !(leg.is_finite() && leg > 0.0) {
-            return Err(TaskError::NoLegs {
-                skeleton: skeleton.name,
-                leg,
-            });
-        }
-        let momentum_scale = (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32;
-        Ok(Stage {
-            skeleton,
-            character,
-            key_bodies,
-            momentum_scale,
-        })
-    }
 }

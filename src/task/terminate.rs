@@ -34,7 +34,8 @@ pub fn failure(
     allowed: &[usize],
     reward: f32,
 ) -> Option<Failure> {
-    if furthest(links, reference) > rules.distance {
+    let lost = |most: f32| furthest(links, reference) > most;
+    if rules.distance.is_some_and(lost) {
         return Some(Failure::Distance);
     }
     let fell = || {

@@ -71,6 +71,9 @@ fn poses(stage: &Stage, links: &[LinkState]) -> Vec<Isometry3<f64>> {
 }
 
 fn rewards(frames: &[Frame]) -> Vec<Curve> {
+    // A term that is never more than nothing is none that this reward has.
+    let earned =
+        |(index, _): &(usize, &&str)| frames.iter().any(|f| f.terms.values()[*index] > 0.0);
     let term = |(index, name): (usize, &&str)| Curve {
         name: name.replace('_', " "),
         values: frames
@@ -78,7 +81,12 @@ fn rewards(frames: &[Frame]) -> Vec<Curve> {
             .map(|f| f64::from(f.terms.values()[index]))
             .collect(),
     };
-    TERM_NAMES.iter().enumerate().map(term).collect()
+    TERM_NAMES
+        .iter()
+        .enumerate()
+        .filter(earned)
+        .map(term)
+        .collect()
 }
 
 fn wide(v: &Vector3<f32>) -> Vector3<f64> {

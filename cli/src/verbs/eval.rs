@@ -7,12 +7,14 @@ use crate::printer::Printer;
 use crate::runs::{self, Measured};
 use mimic::evaluate::Options;
 use mimic::learn::Run;
+use mimic::task::Perturbations;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
   mimic eval                        the newest run
   mimic eval runs/kick --episodes 64 --out kick-64.json
+  mimic eval kick --perturb         how it takes shoves, more or less weight and friction
   mimic eval kick --json            the same fields as in runs/kick/eval.json
 
 A run's own eval.json is written with the default episodes and seconds alone, so that runs can be compared by it.";
@@ -32,6 +34,10 @@ pub struct Args {
     /// Length of an episode of a looping motion; one that ends is played to its end
     #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds)]
     seconds: f64,
+    /// Play every phase a second time, disturbed: shoves, weight and friction as in the run's training, or else the
+    /// usual ones (docs/presets.md)
+    #[arg(long)]
+    perturb: bool,
     /// Threads [default: all]; the result is the same at any number
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     threads: Option<usize>,
@@ -51,6 +57,7 @@ impl Args {
         let options = Options {
             episodes: self.episodes,
             seconds: self.seconds,
+            perturbations: self.perturb.then(|| perturbations(&run)),
         };
         let out = self
             .out
@@ -67,6 +74,14 @@ impl Args {
         };
         printer.result(&runs::evaluation_json(&results), || text(&results))?;
         kept
+    }
+}
+
+fn perturbations(run: &Run) -> Perturbations {
+    let trained = run.plan().task.perturbations;
+    match trained.is_on() {
+        true => trained,
+        false => Perturbations::usual(),
     }
 }
 
@@ -146,8 +161,25 @@ pub fn text(results: &[Measured]) -> String {
                 format!("{:.2} rad", e.root_rotation_turned_rad),
             ),
         ];
-        let rows = rows.map(|(name, value)| format!("  {name:34} {value:>12}\n"));
-        format!("{name}, {} episodes\n{}", e.episodes, rows.concat())
+        let digests = [("from rest", e.from_rest), ("disturbed", e.perturbed)];
+        let digests = digests
+            .into_iter()
+            .filter_map(|(how, digest)| Some((how, digest?)));
+        let rows = rows.map(|(name, value)| (name.to_owned(), value));
+        let more = digests.flat_map(|(how, d)| {
+            [
+                (format!("survival, {how}"), percent(d.survival)),
+                (
+                    format!("body error, local, {how}"),
+                    format!("{:.1} mm", d.mpjpe_local_mm),
+                ),
+            ]
+        });
+        let rows = rows.into_iter().chain(more);
+        let rows: String = rows
+            .map(|(name, value)| format!("  {name:34} {value:>12}\n"))
+            .collect();
+        format!("{name}, {} episodes\n{rows}", e.episodes)
     };
     results.iter().map(table).collect()
 }

@@ -8,6 +8,7 @@ pub mod eval;
 pub mod import;
 pub mod info;
 pub mod man;
+pub mod plot;
 pub mod replay;
 pub mod retarget;
 pub mod tracks;
@@ -28,6 +29,7 @@ pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
         Verb::Tracks(args) => args.run(library, printer),
         Verb::Train(args) => args.run(library, printer),
         Verb::Eval(args) => args.run(printer),
+        Verb::Plot(args) => args.run(printer),
         Verb::Bench(args) => args.run(printer),
         Verb::Replay(args) => args.run(library, printer),
         Verb::Doctor(args) => args.run(library, printer),

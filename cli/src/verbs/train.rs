@@ -3,6 +3,7 @@
 mod finish;
 mod preset;
 mod progress;
+mod setting;
 mod stop;
 
 use crate::args::{ImportArgs, RetargetArgs, at_least_one};
@@ -12,8 +13,8 @@ use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
 use clap::ValueEnum;
-use mimic::learn::{Run, Trainer};
-use mimic::task::TaskError;
+use mimic::learn::{Run, TrainError, Trainer};
+use mimic::task::{Perturbations, TaskError};
 use preset::Preset;
 use progress::Progress;
 use std::path::{Path, PathBuf};
@@ -27,6 +28,15 @@ Examples:
   mimic train walk.motion run.motion                one policy for both
   mimic train --resume kick                         goes on where it stopped, to the same bits
   mimic train kick.fbx --json > curve.jsonl         a line per iteration
+  mimic train kick.fbx --preset booth2020 --samples 20M
+  mimic train kick.fbx --set task.terminations.distance=0.4 --set ppo.gamma=0.97
+
+Presets (docs/presets.md has every value):
+  default     ours: rotations added to the reference's, learned in minutes
+  deepmimic   Peng et al. 2018: absolute targets, the paper's reward and rates; for 60M samples
+  booth2020   Booth & Ivanov 2020, on the character `marathon`: 258 observations, 21 targets, angular momentum, starts
+              at the first frame alone, ends at a reward threshold; for 128M samples
+`--set` changes any single value of them, by its path in the run's config.json under `plan`.
 
 The run folder holds config.json, metrics.jsonl, checkpoint and policy, at the end also eval.json and replay.rrd.
 A finished run is never overwritten: the next run of the same clip is runs/kick-2. Ctrl-C ends the round that is
@@ -45,9 +55,16 @@ pub struct Args {
     /// What is learned
     #[arg(long, value_enum, default_value_t)]
     task: Task,
-    /// Settings to start from: `default`, those of a run, or a JSON file with a plan as in a run's config.json
+    /// Settings to start from: `default`, `deepmimic`, `booth2020`, those of a run, or a JSON file with a plan as in a
+    /// run's config.json
     #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
     preset: String,
+    /// Change one value of the preset, e.g. `task.terminations.distance=0.4`; can be given several times
+    #[arg(long, value_name = "PATH=VALUE")]
+    set: Vec<String>,
+    /// Disturb training by shoves, more or less weight and friction; `task.perturbations` has their ranges
+    #[arg(long)]
+    perturb: bool,
     /// Samples to learn from, e.g. 5M or 800k [default: as the preset says]
     #[arg(long, value_name = "N", value_parser = count)]
     samples: Option<u64>,
@@ -64,7 +81,7 @@ pub struct Args {
     #[arg(
         long,
         value_name = "RUN",
-        conflicts_with_all = ["inputs", "out", "samples", "seed", "preset", "task", "ImportArgs", "RetargetArgs"]
+        conflicts_with_all = ["inputs", "out", "samples", "seed", "preset", "set", "perturb", "task", "ImportArgs", "RetargetArgs"]
     )]
     resume: Option<PathBuf>,
     /// Folder of the run [default: runs/CLIP, numbered when that exists]
@@ -124,7 +141,7 @@ impl Args {
     fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
         let Task::Imitate = self.task;
         let preset = self.preset()?;
-        let preparations = self.preparations(library)?;
+        let preparations = self.preparations(library, preset.skeleton)?;
         let folder = self.folder(&preparations, printer)?;
         let mut motions = Vec::new();
         let mut skeleton = None;
@@ -149,7 +166,8 @@ impl Args {
         Run::create(&folder, preset.plan.clone(), skeleton, motions).map_err(|e| preset.failure(e))
     }
 
-    fn preparations(&self, library: &Path) -> Outcome<Vec<Preparation>> {
+    /// A finished motion has its character; a clip takes the preset's, unless another is asked for.
+    fn preparations(&self, library: &Path, skeleton: Option<&str>) -> Outcome<Vec<Preparation>> {
         let find = |wanted: Option<&Path>| {
             locate::file_or_newest(wanted, library, &locate::ANIMATIONS, "motion")
         };
@@ -161,7 +179,13 @@ impl Args {
                 .map(|input| find(Some(input)))
                 .collect::<Outcome<_>>()?
         };
-        let prepare = |file| Preparation::new(file, &self.import, &self.retarget);
+        let prepare = |file: PathBuf| {
+            let mut retarget = self.retarget.clone();
+            if !locate::has_extension(&file, "motion") {
+                retarget.skeleton = retarget.skeleton.or(skeleton.map(str::to_owned));
+            }
+            Preparation::new(file, &self.import, &retarget)
+        };
         Ok(files.into_iter().map(prepare).collect())
     }
 
@@ -196,7 +220,14 @@ impl Args {
 
     fn preset(&self) -> Outcome<Preset> {
         let mut preset = Preset::load(&self.preset)?;
+        if self.perturb {
+            preset.plan.task.perturbations = Perturbations::usual();
+        }
+        preset.change(&self.set)?;
         let plan = &mut preset.plan;
+        if plan.samples == 0 {
+            return Err(Failure::user(TrainError::Zero("samples")));
+        }
         plan.samples = self.samples.unwrap_or(plan.samples);
         plan.seed = self.seed.unwrap_or(plan.seed);
         Ok(preset)

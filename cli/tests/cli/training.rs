@@ -161,7 +161,7 @@ fn a_run_that_cannot_be_written_is_measured_all_the_same() {
     std::fs::create_dir(bench.path("run/eval.json")).expect("a folder can be made");
     let output = bench.mimic(&["eval", "run", "--json"]).assert().success();
     let output = output.get_output();
-    assert_eq!(lines(&output.stdout)[0]["episodes"], 16);
+    assert_eq!(lines(&output.stdout)[0]["episodes"], 32);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
         said.contains("eval.json") && said.contains("--out"),
@@ -297,4 +297,153 @@ fn bench_has_the_fields_that_scripts_rely_on() {
         assert!(report[field].as_f64() > Some(0.0), "{field}");
     }
     assert!(report["network"].is_array());
+}
+
+#[test]
+fn a_published_preset_trains_on_its_character() {
+    let bench = with_preset();
+    let small = [
+        "environments=8",
+        "group=4",
+        "horizon=16",
+        "round=2",
+        "samples=256",
+        "hidden=[16]",
+        "ppo.minibatch=64",
+    ];
+    for (preset, skeleton, observation, kernels) in [
+        ("deepmimic", "humanoid", 227, "deepmimic"),
+        ("booth2020", "marathon", 258, "booth2020"),
+    ] {
+        let mut line = vec![
+            "train", "sway.txt", "--preset", preset, "--out", preset, "--json",
+        ];
+        small.iter().for_each(|set| line.extend(["--set", set]));
+        let output = bench.mimic(&line).assert().success();
+        let terms = lines(&output.get_output().stdout)[0]["reward_terms"].clone();
+        assert!(terms["end_effector"].as_f64() > Some(0.0), "{terms}");
+        assert_eq!(terms.get("root"), None, "no term of other kernels");
+        let text = std::fs::read_to_string(bench.path(preset).join("config.json"));
+        let config: Value = serde_json::from_str(&text.expect("a config")).expect("is JSON");
+        assert_eq!(config["skeleton"], skeleton);
+        assert_eq!(config["plan"]["task"]["rewards"]["kernels"], kernels);
+        assert_eq!(config["plan"]["hidden"], serde_json::json!([16]));
+        let policy = std::fs::read(bench.path(preset).join("policy.safetensors"));
+        let policy = String::from_utf8_lossy(&policy.expect("a policy")).into_owned();
+        let first = format!("\"actor.0.weight\":{{\"dtype\":\"F32\",\"shape\":[{observation},16]");
+        assert!(
+            policy.contains(&first),
+            "{preset} sees {observation} numbers"
+        );
+    }
+}
+
+#[test]
+fn a_wrong_change_names_what_is_near() {
+    let bench = with_preset();
+    let said = |change: &str| {
+        let line = ["train", "sway.txt", "--set", change];
+        bench.complaint(&line, 2)
+    };
+    let wrong = said("task.termination.distance=1");
+    assert!(wrong.contains("`task.terminations.distance`"), "{wrong}");
+    assert!(said("ppo.gamma=3").contains("gamma is 3"));
+    let wrong = said("task.rewards.kernels=deepmimic");
+    assert!(wrong.contains("`position`"), "{wrong}");
+    assert!(said("task.rewards.kernels=mine").contains("now it is \"tracking\""));
+    assert!(!bench.path("runs").exists());
+}
+
+#[test]
+fn curves_are_drawn_of_several_runs() {
+    let bench = with_run();
+    let other = [
+        "train", "sway.txt", "--preset", "run", "--seed", "2", "--out", "other",
+    ];
+    bench.mimic(&other).assert().success();
+    let report = bench.json(&["plot", "run", "other", "--out", "both.svg"]);
+    assert_eq!(report["plot"], "both.svg");
+    for (run, name) in [(0, "run"), (1, "other")] {
+        let run = &report["runs"][run];
+        assert_eq!(run["name"], name);
+        assert_eq!(run["samples"], serde_json::json!([128, 256, 384, 512]));
+        assert_eq!(run["value_loss"].as_array().map(Vec::len), Some(4));
+        assert!(run["evaluation"]["survival"].is_number());
+    }
+    let drawn = std::fs::read_to_string(bench.path("both.svg")).expect("a drawing");
+    for text in [">run<", ">other<", "policy loss", "evaluation: survival"] {
+        assert!(drawn.contains(text), "{text}");
+    }
+    bench
+        .mimic(&["plot", "run", "--smooth", "1"])
+        .assert()
+        .success();
+    assert!(bench.path("run.svg").exists());
+}
+
+#[test]
+fn a_run_that_cannot_be_drawn_is_named() {
+    let bench = with_run();
+    let said = bench.complaint(&["plot", "absent"], 2);
+    assert!(said.contains("absent"), "{said}");
+    bench.write("run/metrics.jsonl", b"{\"samples\": 1}\nnothing\n");
+    let said = bench.complaint(&["plot", "run"], 2);
+    assert!(
+        said.contains("metrics.jsonl") && said.contains("line 2"),
+        "{said}"
+    );
+    bench.write("run/metrics.jsonl", b"");
+    let said = bench.complaint(&["plot", "run"], 2);
+    assert!(said.contains("train longer"), "{said}");
+    std::fs::remove_file(bench.path("run/metrics.jsonl")).expect("it was written");
+    bench.complaint(&["plot", "run"], 2);
+}
+
+#[test]
+fn an_evaluation_tells_rest_and_disturbance_apart() {
+    let bench = with_run();
+    let line = ["eval", "run", "--episodes", "2", "--seconds", "1"];
+    let plain = bench.json(&line);
+    assert_eq!(
+        (&plain["episodes"], &plain["perturbed"]),
+        (&2.into(), &Value::Null)
+    );
+    assert_eq!(plain["from_rest"]["episodes"], 1);
+    let shoved = bench.json(&[&line[..], &["--perturb"]].concat());
+    assert_eq!(shoved["perturbed"]["episodes"], 2);
+    for field in ["survival", "mpjpe_local_mm", "normalized_return"] {
+        assert_eq!(shoved[field], plain[field], "the rest stays as it is");
+        assert!(shoved["perturbed"][field].is_number() && shoved["from_rest"][field].is_number());
+    }
+    assert_ne!(
+        shoved["perturbed"]["mpjpe_local_mm"],
+        plain["mpjpe_local_mm"]
+    );
+}
+
+#[test]
+fn training_can_be_disturbed_and_says_so() {
+    let bench = with_preset();
+    let line = [
+        "train",
+        "sway.txt",
+        "--preset",
+        "small.json",
+        "--perturb",
+        "--out",
+        "run",
+    ];
+    bench.mimic(&line).assert().success();
+    let text = std::fs::read_to_string(bench.path("run/config.json")).expect("a config");
+    let config: Value = serde_json::from_str(&text).expect("it is JSON");
+    let least = config["plan"]["task"]["perturbations"]["push_m_s"][0].as_f64();
+    assert!(least > Some(0.0), "{text}");
+    let wrong = [
+        "train",
+        "sway.txt",
+        "--set",
+        "task.perturbations.mass=[2,1]",
+    ];
+    let said = bench.complaint(&wrong, 2);
+    assert!(said.contains("perturbations.mass"), "{said}");
 }

@@ -1,9 +1,10 @@
 //! The settings that a run starts from.
 
+use super::setting;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::runs;
-use mimic::learn::{LearnError, Plan, RunError, TrainError};
+use mimic::learn::{LearnError, PRESETS, Plan, RunError, TrainError, preset};
 use mimic::task::TaskError;
 use serde::Deserialize;
 use serde_json::Value;
@@ -11,6 +12,8 @@ use std::path::{Path, PathBuf};
 
 pub struct Preset {
     pub plan: Plan,
+    /// The character that it is meant for, if any.
+    pub skeleton: Option<&'static str>,
     /// `None` for what is built in.
     file: Option<PathBuf>,
 }
@@ -22,11 +25,12 @@ struct Config {
 }
 
 impl Preset {
-    /// `default`, a JSON file with a plan, a run's `config.json`, or a run.
+    /// A preset's name, a JSON file with a plan, a run's `config.json`, or a run.
     pub fn load(name: &str) -> Outcome<Self> {
-        if name == "default" {
+        if let Some(preset) = preset(name) {
             return Ok(Self {
-                plan: Plan::default(),
+                plan: (preset.plan)(),
+                skeleton: Some(preset.skeleton),
                 file: None,
             });
         }
@@ -39,8 +43,18 @@ impl Preset {
         }
         Ok(Self {
             plan,
+            skeleton: None,
             file: Some(file),
         })
+    }
+
+    /// Changes single values: `task.terminations.distance=0.4`.
+    pub fn change(&mut self, changes: &[String]) -> Outcome {
+        for change in changes {
+            self.plan = setting::change(&self.plan, change)
+                .map_err(|e| Failure::user(format!("`--set {change}`: {e}")))?;
+        }
+        Ok(())
     }
 
     /// Why no run can be made with these settings.
@@ -62,9 +76,11 @@ fn file(wanted: &Path) -> Outcome<PathBuf> {
         return Ok(wanted.to_path_buf());
     }
     let run = locate::existing_run(wanted).ok_or_else(|| {
+        let names = PRESETS.map(|preset| format!("`{}`", preset.name));
         Failure::user(format!(
-            "no preset `{}`: give `default`, a JSON file with a plan, or a run",
-            wanted.display()
+            "no preset `{}`: give {}, a JSON file with a plan, or a run",
+            wanted.display(),
+            names.join(", ")
         ))
     })?;
     Ok(run.join(locate::RUN_CONFIG))
@@ -87,8 +103,11 @@ fn is_setting(error: &RunError) -> bool {
         error,
         TrainError::Zero(_)
             | TrainError::FinalStd(_)
+            | TrainError::FinalRate(_)
             | TrainError::TooFewEnvironments { .. }
-            | TrainError::Task(TaskError::Setting { .. })
+            | TrainError::Task(
+                TaskError::Setting { .. } | TaskError::NoSuchTerm { .. } | TaskError::Range { .. }
+            )
             | TrainError::Learn(LearnError::Setting { .. })
     )
 }

@@ -2,6 +2,7 @@
 
 use crate::failure::Outcome;
 use crate::printer::Printer;
+use crate::runs;
 use indicatif::ProgressBar;
 use mimic::learn::{Metrics, Run, Trainer};
 use serde_json::{Value, json};
@@ -85,7 +86,7 @@ impl Drop for Progress {
 
 /// Time is told by the last line that earlier sessions wrote.
 fn seconds_before(run: &Run) -> f64 {
-    let text = std::fs::read_to_string(run.dir().join("metrics.jsonl")).unwrap_or_default();
+    let text = std::fs::read_to_string(run.dir().join(runs::METRICS)).unwrap_or_default();
     let last = text
         .lines()
         .last()

@@ -1,5 +1,6 @@
-//! A motion's tracks as a drawing (SVG).
+//! A motion's tracks as a drawing.
 
+use super::{escaped, short, svg, tick_step};
 use mimic::motion::Motion;
 use std::fmt::Write;
 
@@ -10,8 +11,6 @@ const TOP: f64 = 62.0;
 const GAP: f64 = 34.0;
 const PANEL: f64 = 120.0;
 const LANE: f64 = 20.0;
-/// Distance of tick marks on the vertical axis, at least, in pixels.
-const TICK_ROOM: f64 = 30.0;
 
 const COLORS: [&str; 4] = ["#c8553d", "#2a7f9e", "#6a994e", "#444444"];
 
@@ -128,7 +127,7 @@ impl Sheet {
         };
         let top = self.y;
         let height = |value: f64| top + PANEL * (high - value) / (high - low);
-        let step = tick_step(high - low);
+        let step = tick_step(high - low, PANEL);
         let mut tick = (low / step).ceil();
         while tick * step <= high + 1e-9 * step {
             let (value, y) = (tick * step + 0.0, height(tick * step));
@@ -178,7 +177,7 @@ impl Sheet {
     }
 
     fn text(&mut self, x: f64, y: f64, class: &str, text: &str) {
-        let text = text.replace('&', "&amp;").replace('<', "&lt;");
+        let text = escaped(text);
         self.draw(format!(
             r#"<text class="{class}" x="{x:.1}" y="{y:.1}">{text}</text>"#
         ));
@@ -192,7 +191,7 @@ impl Sheet {
     /// The time axis below the last panel, and the whole as a file.
     fn finish(mut self) -> String {
         let bottom = self.y - GAP;
-        let step = tick_step(self.duration / 2.5);
+        let step = tick_step(self.duration, 2.5 * PANEL);
         let mut tick = 0.0;
         while tick * step <= self.duration + 1e-9 {
             let x = LEFT + tick * step / self.duration * (WIDTH - LEFT - RIGHT);
@@ -207,21 +206,7 @@ impl Sheet {
             );
             tick += 1.0;
         }
-        let height = bottom + 34.0;
-        format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0}" width="{WIDTH}" height="{height:.0}">
-<style>
-text {{ font: 12px system-ui, sans-serif; fill: #333 }}
-.title {{ font-size: 16px; font-weight: 600 }} .heading {{ font-weight: 600 }}
-.tick {{ text-anchor: end; fill: #777 }} .time {{ text-anchor: middle; fill: #777 }}
-.line {{ fill: none; stroke-width: 1.6; stroke-linejoin: round }}
-.grid {{ fill: none; stroke: #e4e4e4 }} .frame {{ fill: none; stroke: #bbb }}
-</style>
-<rect width="100%" height="100%" fill="#fff"/>
-{}</svg>
-"##,
-            self.body
-        )
+        svg(WIDTH, bottom + 34.0, &self.body)
     }
 }
 
@@ -242,22 +227,6 @@ fn stretches(down: &[bool]) -> Vec<(usize, usize)> {
     found
 }
 
-/// 1, 2 or 5 times a power of ten, so that ticks keep their distance.
-fn tick_step(range: f64) -> f64 {
-    let least = range * TICK_ROOM / PANEL;
-    let power = 10f64.powf(least.log10().floor());
-    let step = [1.0, 2.0, 5.0]
-        .map(|m| m * power)
-        .into_iter()
-        .find(|step| *step >= least);
-    step.unwrap_or(10.0 * power)
-}
-
-/// Adding nothing turns a negative zero into a plain one.
-fn short(value: f64) -> String {
-    format!("{}", (value * 1e4).round() / 1e4 + 0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -267,13 +236,5 @@ mod tests {
         assert_eq!(stretches(&[true, true, false, true]), [(0, 2), (3, 4)]);
         assert_eq!(stretches(&[false, true, false]), [(1, 2)]);
         assert!(stretches(&[]).is_empty());
-    }
-
-    #[test]
-    fn ticks_are_round_and_sparse() {
-        assert_eq!(tick_step(4.0), 1.0);
-        assert_eq!(tick_step(1.0), 0.5);
-        assert!((tick_step(0.03) - 0.01).abs() < 1e-12);
-        assert_eq!([short(-0.5), short(-0.0), short(20.0)], ["-0.5", "0", "20"]);
     }
 }

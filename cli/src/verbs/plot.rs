@@ -1,0 +1,291 @@
+//! `mimic plot`: how runs learned.
+
+use crate::failure::{Failure, Outcome};
+use crate::locate;
+use crate::output;
+use crate::plot::curves::{self, Curve, Panel, Scale};
+use crate::printer::Printer;
+use crate::runs;
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  mimic plot                                     the newest run, as kick.svg
+  mimic plot kick kick-seed7 --out seeds.svg     two runs over each other
+  mimic plot kick --smooth 1                     every iteration as it was
+  mimic plot kick --json > curves.json           the numbers as well
+
+Thin lines are single iterations, thick ones means around each. Dots are the evaluation of a finished run.";
+
+/// A curve of this many points is smooth enough.
+const SMOOTH_POINTS: usize = 50;
+
+/// What is drawn: field of metrics.jsonl, heading, scale.
+const FIGURES: [(&str, &str, Scale); 10] = [
+    ("return", "return of an episode", Scale::Linear),
+    ("normalized_return", "normalised return", Scale::Linear),
+    ("episode_length", "episode length, s", Scale::Linear),
+    ("policy_loss", "policy loss", Scale::Linear),
+    ("value_loss", "value loss", Scale::Logarithmic),
+    (
+        "explained_variance",
+        "explained variance of returns",
+        Scale::Linear,
+    ),
+    ("approx_kl", "KL of an update", Scale::Linear),
+    ("learning_rate", "learning rate", Scale::Logarithmic),
+    (
+        "action_std",
+        "action noise, standard deviation",
+        Scale::Linear,
+    ),
+    ("samples_per_second", "samples per second", Scale::Linear),
+];
+
+/// The same of eval.json, beside the samples learned from.
+const EVALUATED: [(&str, &str); 2] = [
+    ("survival", "evaluation: survival"),
+    ("mpjpe_local_mm", "evaluation: local error, mm"),
+];
+
+/// Draw learning curves of runs, several over each other (SVG)
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Run folders, or their names in runs/ [default: the newest run]
+    #[arg(value_name = "RUN")]
+    runs: Vec<PathBuf>,
+    /// Iterations whose mean a point is; 1 for none [default: a fiftieth of the run]
+    #[arg(long, value_name = "N", value_parser = crate::args::at_least_one)]
+    smooth: Option<usize>,
+    /// File to write, or a folder [default: the run's name, or `curves.svg` for several]
+    #[arg(long, short, value_name = "FILE.svg")]
+    out: Option<PathBuf>,
+}
+
+/// What a run wrote while it learned.
+struct Log {
+    name: String,
+    folder: PathBuf,
+    lines: Vec<Map<String, Value>>,
+    evaluation: Option<Value>,
+}
+
+impl Args {
+    pub fn run(self, printer: &Printer) -> Outcome {
+        let folders = match self.runs.is_empty() {
+            true => vec![locate::run(None)?],
+            false => self
+                .runs
+                .iter()
+                .map(|run| locate::run(Some(run)))
+                .collect::<Outcome<_>>()?,
+        };
+        let logs = folders
+            .iter()
+            .map(|folder| Log::read(folder))
+            .collect::<Outcome<Vec<_>>>()?;
+        let names = distinct(&logs);
+        let file = match logs.as_slice() {
+            [one] => one.name.as_str(),
+            _ => "curves",
+        };
+        let path = output::result_path(self.out.as_deref(), file, "svg");
+        for log in &logs {
+            output::make_room(&path, &log.folder.join(runs::METRICS))?;
+        }
+        let panels = panels(&logs, self.smooth);
+        output::write_whole(&path, curves::curves(&names, &panels).as_bytes())?;
+        let report = report(&path, &names, &logs);
+        printer.result(&report, || summary(&path, &names, &logs))
+    }
+}
+
+impl Log {
+    fn read(folder: &Path) -> Outcome<Self> {
+        let path = folder.join(runs::METRICS);
+        let text = std::fs::read_to_string(&path).map_err(|e| {
+            Failure::input(&path, format!("cannot be read ({e}); train the run first"))
+        })?;
+        let mut lines = Vec::new();
+        // A line that is being written has no end yet.
+        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+        for (number, line) in whole.lines().enumerate() {
+            let line = serde_json::from_str(line).map_err(|e| {
+                let number = number + 1;
+                Failure::input(
+                    &path,
+                    format!("line {number} is no iteration ({e}); take it out"),
+                )
+            })?;
+            lines.push(line);
+        }
+        if lines.is_empty() {
+            return Err(Failure::input(
+                &path,
+                "no iteration is in it yet; train longer",
+            ));
+        }
+        let name = folder.file_name().unwrap_or(folder.as_os_str());
+        Ok(Self {
+            name: name.to_string_lossy().into_owned(),
+            evaluation: evaluation(&folder.join(runs::EVALUATION))?,
+            folder: folder.to_owned(),
+            lines,
+        })
+    }
+
+    fn samples(&self) -> f64 {
+        let last = self.lines.last().and_then(|line| line.get("samples"));
+        last.and_then(Value::as_f64).unwrap_or(0.0)
+    }
+
+    /// (samples, value) of every iteration that has this figure.
+    fn points(&self, field: &str) -> Vec<(f64, f64)> {
+        let number = |line: &Map<String, Value>, field: &str| line.get(field)?.as_f64();
+        let points = self.lines.iter();
+        points
+            .filter_map(|line| Some((number(line, "samples")?, number(line, field)?)))
+            .collect()
+    }
+
+    /// A figure of the evaluation, the mean over a run's motions.
+    fn evaluated(&self, field: &str) -> Option<f64> {
+        let evaluation = self.evaluation.as_ref()?;
+        let Some(motions) = evaluation["motions"].as_array() else {
+            return evaluation[field].as_f64();
+        };
+        let values: Option<Vec<f64>> = motions.iter().map(|m| m[field].as_f64()).collect();
+        let values = values.filter(|values| !values.is_empty())?;
+        Some(values.iter().sum::<f64>() / values.len() as f64)
+    }
+}
+
+/// A run that isn't finished has none.
+fn evaluation(path: &Path) -> Outcome<Option<Value>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
+    let value = serde_json::from_str(&text).map_err(|e| {
+        Failure::input(
+            path,
+            format!("is no evaluation ({e}); make it anew with `mimic eval`"),
+        )
+    })?;
+    Ok(Some(value))
+}
+
+/// Names for the legend; where two runs share one, their folders.
+fn distinct(logs: &[Log]) -> Vec<String> {
+    let shared = |name: &str| logs.iter().filter(|log| log.name == name).count() > 1;
+    logs.iter()
+        .map(|log| match shared(&log.name) {
+            true => log.folder.display().to_string(),
+            false => log.name.clone(),
+        })
+        .collect()
+}
+
+/// Panels that any of the runs can fill.
+fn panels(logs: &[Log], smooth: Option<usize>) -> Vec<Panel> {
+    let learned = FIGURES.iter().map(|(field, heading, scale)| Panel {
+        heading,
+        scale: *scale,
+        curves: logs
+            .iter()
+            .map(|log| curve(log.points(field), smooth))
+            .collect(),
+    });
+    let evaluated = EVALUATED.iter().map(|(field, heading)| Panel {
+        heading,
+        scale: Scale::Linear,
+        curves: logs
+            .iter()
+            .map(|log| {
+                let dot = log.evaluated(field).map(|value| (log.samples(), value));
+                curve(dot.into_iter().collect(), Some(1))
+            })
+            .collect(),
+    });
+    let filled = |panel: &Panel| panel.curves.iter().any(|curve| !curve.raw.is_empty());
+    learned.chain(evaluated).filter(filled).collect()
+}
+
+fn curve(raw: Vec<(f64, f64)>, smooth: Option<usize>) -> Curve {
+    let window = smooth.unwrap_or(raw.len() / SMOOTH_POINTS).max(1);
+    Curve {
+        smooth: mean_around(&raw, window),
+        raw,
+    }
+}
+
+/// Each value's mean with those around it, `window` in all; at the ends with as many as there are on both sides, so
+/// that a straight line stays one.
+fn mean_around(points: &[(f64, f64)], window: usize) -> Vec<(f64, f64)> {
+    let mut sums = vec![0.0];
+    let mut sum = 0.0;
+    for (_, value) in points {
+        sum += value;
+        sums.push(sum);
+    }
+    let mean = |i: usize| {
+        let reach = (window / 2).min(i).min(points.len() - 1 - i);
+        let (from, to) = (i - reach, i + reach + 1);
+        (sums[to] - sums[from]) / (to - from) as f64
+    };
+    (0..points.len()).map(|i| (points[i].0, mean(i))).collect()
+}
+
+fn report(path: &Path, names: &[String], logs: &[Log]) -> Value {
+    let run = |(name, log): (&String, &Log)| {
+        let column = |field: &str| -> Vec<Value> {
+            let value = |line: &Map<String, Value>| line.get(field).cloned().unwrap_or_default();
+            log.lines.iter().map(value).collect()
+        };
+        let mut run = json!({ "run": log.folder, "name": name, "samples": column("samples") });
+        for (field, ..) in FIGURES {
+            run[field] = column(field).into();
+        }
+        let evaluated = EVALUATED.map(|(field, _)| (field.to_owned(), json!(log.evaluated(field))));
+        run["evaluation"] = Value::Object(Map::from_iter(evaluated));
+        run
+    };
+    let runs: Vec<Value> = names.iter().zip(logs).map(run).collect();
+    json!({ "plot": path, "runs": runs })
+}
+
+fn summary(path: &Path, names: &[String], logs: &[Log]) -> String {
+    let mut text = format!("{}\n", path.display());
+    for (name, log) in names.iter().zip(logs) {
+        let last = log.points("normalized_return").last().map(|(_, y)| *y);
+        let figure = |value: Option<f64>, digits: usize| {
+            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
+        };
+        text += &format!(
+            "  {name}: {} iterations, {:.2} M samples, normalised return {}, survival {}, local error {} mm\n",
+            log.lines.len(),
+            log.samples() / 1e6,
+            figure(last, 3),
+            figure(log.evaluated("survival"), 3),
+            figure(log.evaluated("mpjpe_local_mm"), 1),
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smoothing_keeps_lines_and_means() {
+        let line: Vec<_> = (0..9).map(|x| (f64::from(x), 2.0 * f64::from(x))).collect();
+        assert_eq!(mean_around(&line, 5), line);
+        let peak = [(0.0, 0.0), (1.0, 3.0), (2.0, 0.0)];
+        assert_eq!(mean_around(&peak, 3), [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]);
+        assert_eq!(mean_around(&peak, 1), peak);
+        assert!(mean_around(&[], 3).is_empty());
+    }
+}

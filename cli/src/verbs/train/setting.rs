@@ -1,0 +1,130 @@
+//! Single values of a plan, by their path: `ppo.gamma=0.99`.
+
+use mimic::learn::Plan;
+use serde_json::Value;
+
+/// How many names an error lists.
+const SHOWN: usize = 3;
+
+/// The plan with one value changed. `change` is `PATH=VALUE`, the value as in JSON; a plain word needs no quotes.
+///
+/// # Errors
+/// What is wrong about it, in words.
+pub fn change(plan: &Plan, change: &str) -> Result<Plan, String> {
+    let (path, text) = change
+        .split_once('=')
+        .ok_or("give a path and a value, e.g. `ppo.gamma=0.99`")?;
+    let (path, text) = (path.trim(), text.trim());
+    // By way of text, where single precision has its shortest digits.
+    let written = serde_json::to_string(plan).map_err(|e| e.to_string())?;
+    let mut values: Value = serde_json::from_str(&written).map_err(|e| e.to_string())?;
+    let known = paths(&values);
+    let pointer = format!("/{}", path.trim_start_matches('/').replace('.', "/"));
+    let place = values
+        .pointer_mut(&pointer)
+        .filter(|_| !path.is_empty())
+        .ok_or_else(|| unknown(path, &known))?;
+    let old = place.to_string();
+    *place = serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
+    serde_json::from_value(values).map_err(|e| format!("{e}; now it is {old}"))
+}
+
+fn unknown(path: &str, known: &[String]) -> String {
+    let mut near: Vec<&String> = known.iter().collect();
+    near.sort_by_key(|name| distance(path, name));
+    let near: Vec<String> = near
+        .iter()
+        .take(SHOWN)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    format!(
+        "there is no setting `{path}`; near it are {}",
+        near.join(", ")
+    )
+}
+
+/// Every path in a plan, those of whole groups as well.
+fn paths(value: &Value) -> Vec<String> {
+    let Value::Object(fields) = value else {
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    for (name, value) in fields {
+        found.push(name.clone());
+        found.extend(paths(value).iter().map(|inner| format!("{name}.{inner}")));
+    }
+    found
+}
+
+/// How far a path is from one that exists; a path's last name alone is as near as the whole.
+fn distance(typed: &str, name: &str) -> usize {
+    let last = |path: &str| path.rsplit(['.', '/']).next().unwrap_or(path).to_owned();
+    edits(typed, name).min(edits(&last(typed), &last(name)))
+}
+
+/// Levenshtein's distance: letters to put in, take out or change.
+fn edits(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut corner = i;
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let changed = corner + usize::from(x != *y);
+            corner = row[j + 1];
+            row[j + 1] = changed.min(corner + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mimic::task::Actions;
+
+    #[test]
+    fn a_change_changes_one_value() {
+        let plan = Plan::default();
+        let mut expected = plan.clone();
+        expected.task.terminations.distance = Some(0.4);
+        assert_eq!(
+            change(&plan, "task.terminations.distance=0.4"),
+            Ok(expected.clone())
+        );
+        assert_eq!(
+            change(&plan, "/task/terminations/distance=0.4"),
+            Ok(expected)
+        );
+        let free =
+            change(&plan, "task.terminations.distance=null").map(|p| p.task.terminations.distance);
+        assert_eq!(free, Ok(None));
+        let wide = change(&plan, "hidden=[64, 32]").map(|p| p.hidden);
+        assert_eq!(wide, Ok(vec![64, 32]));
+        let smooth = change(&plan, "activation=tanh").map(|p| serde_json::json!(p.activation));
+        assert_eq!(smooth, Ok("tanh".into()));
+        let whole = change(&plan, r#"task.actions={"kind": "absolute", "reach": 1}"#);
+        assert_eq!(
+            whole.map(|p| p.task.actions),
+            Ok(Actions::Absolute { reach: 1.0 })
+        );
+    }
+
+    #[test]
+    fn a_wrong_change_is_explained() {
+        let said = |text| change(&Plan::default(), text).expect_err("it is wrong");
+        assert!(said("task.termination.distance=1").contains("`task.terminations.distance`"));
+        assert!(said("gama=1").contains("`ppo.gamma`"));
+        assert!(said("ppo.gamma=high").ends_with("now it is 0.95"));
+        assert!(said("task.actions.kind=absolute").contains("reach"));
+        assert!(said("gamma").contains("ppo.gamma=0.99"));
+        assert!(said("=3").contains("no setting"));
+    }
+
+    #[test]
+    fn edits_are_counted() {
+        assert_eq!(edits("kitten", "sitting"), 3);
+        assert_eq!(edits("", "abc"), 3);
+        assert_eq!(edits("same", "same"), 0);
+    }
+}

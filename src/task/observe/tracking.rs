@@ -1,0 +1,102 @@
+//! Our own observation: agent, errors and phase, in the root's frame.
+
+use super::{Scene, Writer};
+use crate::sim::LinkState;
+use crate::task::Stage;
+use nalgebra::{UnitQuaternion, Vector3};
+
+pub(super) fn layout(stage: &Stage, contacts: usize) -> Vec<(&'static str, usize)> {
+    let dof = stage.character.dof;
+    vec![
+        ("root_height", 1),
+        ("up", 3),
+        ("root_velocity", 3),
+        ("root_angular_velocity", 3),
+        ("joint_rotation", dof),
+        ("joint_velocity", dof),
+        ("key_position", 3 * stage.key_bodies.len()),
+        ("com", 3),
+        ("com_velocity", 3),
+        ("angular_momentum", 3),
+        ("contact", contacts),
+        ("joint_rotation_error", dof),
+        ("joint_velocity_error", dof),
+        ("root_position_error", 3),
+        ("root_rotation_error", 3),
+        ("root_velocity_error", 3),
+        ("root_angular_velocity_error", 3),
+        ("reference_contact", contacts),
+        ("phase", 5),
+    ]
+}
+
+pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
+    let Scene {
+        links,
+        dynamics,
+        contacts,
+        next,
+        ..
+    } = *scene;
+    let root = &links[0];
+    let into_root = |v: Vector3<f32>| root.pose.rotation.inverse_transform_vector(&v);
+    let center = root.pose.translation.vector;
+    w.one(center.z);
+    w.vector(into_root(Vector3::z()));
+    w.vector(into_root(root.linear));
+    w.vector(into_root(root.angular));
+    joints(stage, w, |i, p| relative(stage, links, i, p).scaled_axis());
+    joints(stage, w, |i, p| rate(links, i, p));
+    for &body in &stage.key_bodies {
+        let (link, offset) = &stage.character.bodies[body];
+        let at =
+            links[*link].pose * nalgebra::Point3::from(offset.translation.vector.cast::<f32>());
+        w.vector(into_root(at.coords - center));
+    }
+    w.vector(into_root(dynamics.com - center));
+    w.vector(into_root(dynamics.com_velocity));
+    w.vector(into_root(dynamics.angular_momentum) / stage.momentum_scale);
+    w.flags(contacts);
+    joints(stage, w, |i, p| {
+        (relative(stage, links, i, p).inverse() * relative(stage, &next.links, i, p)).scaled_axis()
+    });
+    joints(stage, w, |i, p| rate(&next.links, i, p) - rate(links, i, p));
+    let wanted = &next.links[0];
+    w.vector(into_root(wanted.pose.translation.vector - center));
+    w.vector((root.pose.rotation.inverse() * wanted.pose.rotation).scaled_axis());
+    w.vector(into_root(wanted.linear - root.linear));
+    w.vector(into_root(wanted.angular - root.angular));
+    w.flags(&next.contacts);
+    let turn = std::f32::consts::TAU * next.phase;
+    for value in [
+        next.phase,
+        turn.sin(),
+        turn.cos(),
+        (2.0 * turn).sin(),
+        (2.0 * turn).cos(),
+    ] {
+        w.one(value);
+    }
+}
+
+fn joints(stage: &Stage, w: &mut Writer, value: impl Fn(usize, usize) -> Vector3<f32>) {
+    for (i, link) in stage.character.links.iter().enumerate() {
+        if let Some(parent) = link.parent {
+            w.joint(&link.joint, value(i, parent));
+        }
+    }
+}
+
+fn relative(stage: &Stage, links: &[LinkState], link: usize, parent: usize) -> UnitQuaternion<f32> {
+    stage
+        .character
+        .joint_rotation(link, links[parent].pose.rotation, links[link].pose.rotation)
+}
+
+/// Angular velocity of a link against its parent, in the link's frame.
+fn rate(links: &[LinkState], link: usize, parent: usize) -> Vector3<f32> {
+    links[link]
+        .pose
+        .rotation
+        .inverse_transform_vector(&(links[link].angular - links[parent].angular))
+}

@@ -1,0 +1,120 @@
+//! The stage on which a task plays.
+
+use super::setting::TaskError;
+use crate::humanoid::Slot;
+use crate::sim::{Character, Link};
+use crate::skeleton::{Shape, Skeleton};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+/// Points this little above the lowest one are of the sole, metres.
+const SOLE: f64 = 0.01;
+
+/// A round end or a corner of a foot's shapes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolePoint {
+    pub link: usize,
+    /// In the link's frame, metres.
+    pub center: Vector3<f32>,
+    pub radius: f32,
+}
+
+/// What every environment of a run shares: skeleton, character and the bodies of interest.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub skeleton: Skeleton,
+    pub character: Character,
+    /// Bodies whose positions the observation holds: head, hands and feet where the skeleton has them.
+    pub key_bodies: Vec<usize>,
+    /// Hands and feet where the skeleton has them.
+    pub end_bodies: Vec<usize>,
+    pub chest_body: Option<usize>,
+    /// Heel, left of the toes, right of the toes, of each foot.
+    pub soles: Vec<SolePoint>,
+    /// What divides angular momentum: mass × leg length × √(g × leg length), kg·m²/s.
+    pub momentum_scale: f32,
+}
+
+impl Stage {
+    /// # Errors
+    /// A skeleton that can't be simulated.
+    pub fn new(skeleton: Skeleton) -> Result<Self, TaskError> {
+        let character = Character::new(&skeleton)?;
+        let ends = [
+            Slot::LeftHand,
+            Slot::RightHand,
+            Slot::LeftFoot,
+            Slot::RightFoot,
+        ];
+        let body = |slot: &Slot| skeleton.slots.get(slot).copied();
+        let end_bodies: Vec<usize> = ends.iter().filter_map(body).collect();
+        let leg = skeleton.leg_length();
+        if !(leg.is_finite() && leg > 0.0) {
+            return Err(TaskError::NoLegs {
+                skeleton: skeleton.name,
+                leg,
+            });
+        }
+        Ok(Stage {
+            key_bodies: body(&Slot::Head)
+                .into_iter()
+                .chain(end_bodies.iter().copied())
+                .collect(),
+            chest_body: body(&Slot::Chest),
+            soles: soles(&skeleton, &character),
+            end_bodies,
+            momentum_scale: (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32,
+            skeleton,
+            character,
+        })
+    }
+}
+
+fn soles(skeleton: &Skeleton, character: &Character) -> Vec<SolePoint> {
+    let rest = skeleton.forward(&skeleton.rest_qpos());
+    let feet = [Slot::LeftFoot, Slot::RightFoot];
+    let feet = feet.iter().filter_map(|slot| skeleton.slots.get(slot));
+    feet.flat_map(|&foot| {
+        let link = character.bodies[foot].0;
+        let upright = rest[character.links[link].body].rotation;
+        sole(link, &character.links[link], &upright)
+    })
+    .collect()
+}
+
+/// The points of a link's sole that are furthest back, front and left, front and right in the rest pose.
+fn sole(index: usize, link: &Link, upright: &UnitQuaternion<f64>) -> Vec<SolePoint> {
+    let points: Vec<_> = link.shapes.iter().flat_map(ends).collect();
+    let height = |(p, radius): &(Vector3<f64>, f64)| (upright * p).z - radius;
+    let lowest = points.iter().map(height).fold(f64::INFINITY, f64::min);
+    let low = || points.iter().filter(|p| height(p) < lowest + SOLE);
+    let ways = [(-1.0, 0.0), (1.0, 1.0), (1.0, -1.0)];
+    let furthest = ways.iter().filter_map(|(x, y)| {
+        let along = |p: &Vector3<f64>| (upright * p).dot(&Vector3::new(*x, *y, 0.0));
+        low().max_by(|a, b| along(&a.0).total_cmp(&along(&b.0)))
+    });
+    furthest
+        .map(|(center, radius)| SolePoint {
+            link: index,
+            center: center.cast(),
+            radius: *radius as f32,
+        })
+        .collect()
+}
+
+/// Balls that a shape is the hull of; a box's are its corners, of radius 0.
+fn ends(shape: &Shape) -> Vec<(Vector3<f64>, f64)> {
+    match shape {
+        Shape::Sphere { center, radius } => vec![(*center, *radius)],
+        Shape::Capsule { a, b, radius } => vec![(*a, *radius), (*b, *radius)],
+        Shape::Box { pose, half } => (0..8)
+            .map(|corner: u32| {
+                let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+                let signs = Vector3::new(sign(0), sign(1), sign(2));
+                (
+                    (pose * Point3::from(half.component_mul(&signs))).coords,
+                    0.0,
+                )
+            })
+            .collect(),
+    }
+}
