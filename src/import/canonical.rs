@@ -151,7 +151,7 @@ impl<'a> Rig<'a> {
             self.frame.axes = up.canonical_from_file();
             self.joints = self.rest_joints(rest)?;
             self.problems
-                .push(upright::problem(self.scene.up_axis(), up));
+                .push(upright::problem(&self.scene.contents().up_axis, up));
             self.other_up = Some(up);
         }
         Ok(())

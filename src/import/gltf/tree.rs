@@ -34,12 +34,7 @@ pub(super) struct Tree {
 impl Tree {
     /// World matrices of all nodes by their own transforms.
     pub fn rest_world(&self) -> Vec<Matrix4<f64>> {
-        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(self.nodes.len());
-        for (node, rest) in self.nodes.iter().zip(&self.rest) {
-            let local = rest.matrix();
-            world.push(node.parent.map_or(local, |parent| world[parent] * local));
-        }
-        world
+        scene::composed(&self.nodes, self.rest.iter().map(Rest::matrix))
     }
 }
 
