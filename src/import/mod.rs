@@ -48,10 +48,12 @@ const MOST_BYTES: u64 = 2 << 30;
 
 /// Frames × joints that any file may be sampled to, and how many more per byte of it: a few bytes can tell of hours,
 /// but motion that fills them takes more.
-const FREE_TRANSFORMS: usize = 1 << 20;
+const FREE_TRANSFORMS: usize = 1 << 18;
 const TRANSFORMS_PER_BYTE: f64 = 0.5;
 /// Nodes or channels that may be looked at for each of these transforms: most of a file's nodes may be no joints.
 const LOOKS_PER_TRANSFORM: usize = 8;
+/// Joints that a frame counts for at least, as it takes memory of its own.
+const LEAST_JOINTS: usize = 2;
 
 /// How a file is to be read, where it shouldn't decide itself.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -279,7 +281,7 @@ fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<(f64, f64),
 fn most_frames(scene: &dyn Scene, take: &Take, joints: usize, transforms: usize) -> usize {
     let transforms = transforms.min(MOST_TRANSFORMS);
     let looks = scene.nodes().len().max(take.channels);
-    let kept = transforms / joints.max(1);
+    let kept = transforms / joints.max(LEAST_JOINTS);
     kept.min(transforms.saturating_mul(LOOKS_PER_TRANSFORM) / looks.max(1))
 }
 

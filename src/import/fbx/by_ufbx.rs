@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use ufbx::{AllocatorOpts, ElementType, LoadOpts, OpenFileCb, ProgressCb, ProgressResult};
 
 /// Bytes that any file may make ufbx take, and how many more per byte of it, for what it keeps and for what it needs
-/// on the way, each.
-const FREE_BYTES: usize = 64 << 20;
+/// on the way, each. It takes them from Rust's allocator.
+const FREE_BYTES: usize = 8 << 20;
 const BYTES_PER_BYTE: usize = 32;
 /// Most time for reading, and bytes after which it is looked at. Files of a gigabyte take seconds.
 const MOST_TIME: Duration = Duration::from_secs(60);
