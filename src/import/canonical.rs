@@ -128,10 +128,14 @@ impl<'a> Rig<'a> {
 
     fn rest_joints(&self, rest: Option<(usize, f64)>) -> Result<Vec<Joint>, Error> {
         let locals = self.locals(&self.world(rest, None)?);
-        let joint = |(j, rest): (usize, Isometry3<f64>)| Joint {
-            name: self.scene.nodes()[self.nodes[j]].name.clone(),
-            parent: self.parents[j],
-            rest,
+        let joint = |(j, rest): (usize, Isometry3<f64>)| {
+            let node = &self.scene.nodes()[self.nodes[j]];
+            Joint {
+                name: node.name.clone(),
+                parent: self.parents[j],
+                rest,
+                bone: node.bone.clone(),
+            }
         };
         Ok(locals.into_iter().enumerate().map(joint).collect())
     }

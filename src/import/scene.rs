@@ -13,6 +13,8 @@ pub(crate) struct Node {
     pub is_bone: bool,
     /// The file holds nothing but transforms in it (no mesh, camera or light).
     pub is_plain: bool,
+    /// The bone of a humanoid that the file says this is, as in [`Joint::bone`](crate::clip::Joint::bone).
+    pub bone: Option<String>,
 }
 
 impl Node {
@@ -23,6 +25,7 @@ impl Node {
             parent,
             is_bone: true,
             is_plain: true,
+            bone: None,
         }
     }
 }

@@ -128,6 +128,7 @@ fn tree(scene: &ufbx::Scene) -> (Vec<Node>, Vec<usize>) {
             parent,
             is_bone: node.bone.is_some(),
             is_plain: is_plain(node),
+            bone: None,
         });
         ids.push(id);
     }

@@ -176,24 +176,35 @@ impl Default for HumanBones {
     }
 }
 
+impl HumanBones {
+    fn named(&self) -> Vec<(i64, &str)> {
+        match self {
+            Self::List(bones) => bones.iter().map(|b| (b.node, b.bone.as_str())).collect(),
+            Self::Named(bones) => bones
+                .iter()
+                .map(|(name, b)| (b.node, name.as_str()))
+                .collect(),
+        }
+    }
+}
+
 #[derive(Deserialize)]
 struct HumanBone {
+    /// Its name, in lists.
+    #[serde(default)]
+    bone: String,
     /// −1 where the humanoid lacks the bone.
     node: i64,
 }
 
 impl Extensions {
-    /// Nodes that are bones of a VRM humanoid; the file may lack them.
-    pub fn bones(&self) -> Vec<usize> {
+    /// Nodes that are bones of a VRM humanoid, and which; the file may lack them.
+    pub fn bones(&self) -> impl Iterator<Item = (usize, &str)> {
         let all = [&self.vrm_0, &self.vrm_1, &self.vrm_animation];
-        let nodes = |vrm: &&Vrm| match &vrm.humanoid.human_bones {
-            HumanBones::List(bones) => bones.iter().map(|bone| bone.node).collect::<Vec<_>>(),
-            HumanBones::Named(bones) => bones.values().map(|bone| bone.node).collect(),
-        };
-        let nodes = all.iter().flat_map(nodes);
-        nodes
-            .filter_map(|node| usize::try_from(node).ok())
-            .collect()
+        let bones = all
+            .into_iter()
+            .flat_map(|vrm| vrm.humanoid.human_bones.named());
+        bones.filter_map(|(node, bone)| Some((usize::try_from(node).ok()?, bone)))
     }
 }
 
