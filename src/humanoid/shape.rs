@@ -14,25 +14,25 @@ const LIKE_BONE: f64 = 0.5;
 /// Branches of one joint that are compared.
 const BRANCHES: usize = 16;
 
-const LEFT_LEG: [Slot; 4] = [
+pub(super) const LEFT_LEG: [Slot; 4] = [
     Slot::LeftUpperLeg,
     Slot::LeftLowerLeg,
     Slot::LeftFoot,
     Slot::LeftToes,
 ];
-const RIGHT_LEG: [Slot; 4] = [
+pub(super) const RIGHT_LEG: [Slot; 4] = [
     Slot::RightUpperLeg,
     Slot::RightLowerLeg,
     Slot::RightFoot,
     Slot::RightToes,
 ];
-const LEFT_ARM: [Slot; 4] = [
+pub(super) const LEFT_ARM: [Slot; 4] = [
     Slot::LeftShoulder,
     Slot::LeftUpperArm,
     Slot::LeftLowerArm,
     Slot::LeftHand,
 ];
-const RIGHT_ARM: [Slot; 4] = [
+pub(super) const RIGHT_ARM: [Slot; 4] = [
     Slot::RightShoulder,
     Slot::RightUpperArm,
     Slot::RightLowerArm,

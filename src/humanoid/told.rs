@@ -1,5 +1,6 @@
 //! Slots of joints that the file itself calls bones of a humanoid, as VRM files do.
 
+use super::shape::{LEFT_ARM, LEFT_LEG, RIGHT_ARM, RIGHT_LEG};
 use super::tree::Tree;
 use super::{HumanoidMap, Slot};
 use crate::clip::Joint;
@@ -10,30 +11,10 @@ const TRUNK: [&str; 3] = ["spine", "chest", "upperChest"];
 /// Slots whose joints stand below each other, in order.
 const CHAINS: [&[Slot]; 5] = [
     &[Slot::Chest, Slot::Neck, Slot::Head],
-    &[
-        Slot::LeftShoulder,
-        Slot::LeftUpperArm,
-        Slot::LeftLowerArm,
-        Slot::LeftHand,
-    ],
-    &[
-        Slot::RightShoulder,
-        Slot::RightUpperArm,
-        Slot::RightLowerArm,
-        Slot::RightHand,
-    ],
-    &[
-        Slot::LeftUpperLeg,
-        Slot::LeftLowerLeg,
-        Slot::LeftFoot,
-        Slot::LeftToes,
-    ],
-    &[
-        Slot::RightUpperLeg,
-        Slot::RightLowerLeg,
-        Slot::RightFoot,
-        Slot::RightToes,
-    ],
+    &LEFT_ARM,
+    &RIGHT_ARM,
+    &LEFT_LEG,
+    &RIGHT_LEG,
 ];
 
 /// The slots that the file tells, none in most files.
