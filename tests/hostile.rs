@@ -147,12 +147,13 @@ fn many_skins() -> Vec<u8> {
     gltf(&[node; 20_000].join(","), &[skin; 20_000].join(","), "")
 }
 
-/// A bone that moves for more than an hour, in a file of two keys.
-fn long_take() -> Vec<u8> {
-    assert_eq!(4096_f32.to_le_bytes(), [0, 0, 128, 69]);
+/// A bone that moves for `seconds`, which are more than an hour, in a file of two keys.
+fn long_take(seconds: f32) -> Vec<u8> {
     let take = r#"{"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}],"samplers":[{"input":0,"output":1}]}"#;
     let file = String::from_utf8(gltf("{}", r#"{"joints":[0]}"#, take)).expect("a text");
-    file.replace("AAAAAAAAyEc=", "AAAAAAAAgEU=").into_bytes()
+    let codes = seconds.to_le_bytes().map(|byte| format!("%{byte:02x}"));
+    let key = format!("data:,%00%00%00%00{}", codes.concat());
+    file.replace("data:;base64,AAAAAAAAyEc=", &key).into_bytes()
 }
 
 /// A bone that moves for 28 hours among many meshes: its frames are few enough to keep, but all nodes have to be placed.
@@ -357,8 +358,10 @@ fn reading_costs_no_more_than_the_size_allows() {
     assert!(bearable("keys.fbx", &packed_keys(250_000)).is_ok());
     let error = bearable("keys.fbx", &packed_keys(280_000)).expect_err("refused");
     assert!(error.to_string().contains("implausibly large"), "{error}");
-    let long = bearable("long.gltf", &long_take()).expect("it imports");
+    let long = bearable("long.gltf", &long_take(4096.0)).expect("it imports");
     assert_eq!(long.frames.len(), 122_881);
+    let longer = bearable("long.gltf", &long_take(16_384.0)).expect_err("refused");
+    assert!(longer.to_string().contains("--trim"), "{longer}");
     assert!(frugal("one.fbx", &shared_layer(1, 1000)).is_ok());
     assert!(refusal("shared.fbx", &shared_layer(4000, 1000)).contains("implausibly often"));
 }

@@ -266,7 +266,7 @@ fn some_inputs() {
 }
 
 #[test]
-#[ignore = "takes an hour"]
+#[ignore = "takes minutes"]
 fn many_inputs() {
     let first = setting("MIMIC_FUZZ_FIRST", 0);
     let inputs = setting("MIMIC_FUZZ_INPUTS", 1_000_000);
