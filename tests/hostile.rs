@@ -1,62 +1,23 @@
-//! Damaged copies of our own clips: reading them ends soon and takes no more memory than their size allows.
-//!
-//! One test alone in its program, as it counts what the whole program allocates.
+//! Small files made to cost much, and damaged copies of our own clips. `fuzz` has damage to real files of every format.
 
 #[path = "import/damage.rs"]
 mod damage;
+#[path = "fuzz/heap.rs"]
+mod heap;
 
 use damage::Damage;
+use mimic::clip::Clip;
 use mimic::import::{self, Error, Options};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
-
-/// The system's allocator with a count of the bytes in use and the most there were.
-struct Counting {
-    used: AtomicUsize,
-    peak: AtomicUsize,
-}
-
-#[global_allocator]
-static HEAP: Counting = Counting {
-    used: AtomicUsize::new(0),
-    peak: AtomicUsize::new(0),
-};
-
-// SAFETY: every call is handed on to the system's allocator as it came.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let used = self.used.fetch_add(layout.size(), Relaxed) + layout.size();
-        self.peak.fetch_max(used, Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        self.used.fetch_sub(layout.size(), Relaxed);
-        // SAFETY: `at` came from `System` with this layout.
-        unsafe { System.dealloc(at, layout) }
-    }
-}
-
-impl Counting {
-    /// What `work` returns, and the most bytes it had in use at once.
-    fn peak_of<T>(&self, work: impl FnOnce() -> T) -> (T, usize) {
-        let before = self.used.load(Relaxed);
-        self.peak.store(before, Relaxed);
-        let result = work();
-        (result, self.peak.load(Relaxed) - before)
-    }
-}
 
 const PER_BYTE: usize = 64;
 const CONSTANT: usize = 256 << 10;
 /// Bytes for a sampled transform: seven numbers in world space, seven in the parent's, and the lists that hold them.
-const PER_TRANSFORM: usize = 160;
+const PER_TRANSFORM: usize = 120;
 /// Transforms that any file may be sampled to.
-const FREE_TRANSFORMS: usize = 1 << 20;
-/// Bytes for lists as long as they may be, of the shortest entries.
-const LIST: usize = 128 << 20;
+const FREE_TRANSFORMS: usize = 1 << 18;
+/// Bytes that any file may take, whatever is in it: for lists as long as they may be, of the shortest entries.
+const FREE: usize = 32 << 20;
 const ROUNDS: usize = 2000;
 const SOON: Duration = Duration::from_secs(10);
 
@@ -81,7 +42,7 @@ fn inspected(name: &str, bytes: &[u8]) {
     let path = folder.path().join("file");
     std::fs::write(&path, bytes).expect("it is written");
     let start = Instant::now();
-    let (look, peak) = HEAP.peak_of(|| import::inspect(&path));
+    let (look, peak) = heap::peak_of(|| import::inspect(&path));
     let seconds = start.elapsed();
     assert!(seconds < SOON, "{name}: {seconds:?}");
     let most = PER_BYTE * bytes.len() + CONSTANT;
@@ -102,7 +63,7 @@ fn inspected(name: &str, bytes: &[u8]) {
 fn frugal(name: &str, bytes: &[u8]) -> Result<usize, Error> {
     inspected(name, bytes);
     let start = Instant::now();
-    let (clip, peak) = HEAP.peak_of(|| import::read(bytes, name, None, &Options::default()));
+    let (clip, peak) = heap::peak_of(|| import::read(bytes, name, None, &Options::default()));
     let seconds = start.elapsed();
     assert!(seconds < SOON, "{name}: {seconds:?}");
     let transforms = match &clip {
@@ -113,6 +74,13 @@ fn frugal(name: &str, bytes: &[u8]) -> Result<usize, Error> {
     let most = PER_BYTE * bytes.len() + PER_TRANSFORM * transforms + CONSTANT;
     assert!(peak < most, "{name}: {peak} bytes for {}", bytes.len());
     clip.map(|_| transforms)
+}
+
+/// Reads `bytes` that may take what any file may.
+fn bearable(name: &str, bytes: &[u8]) -> Result<Clip, Error> {
+    let (clip, peak) = heap::peak_of(|| import::read(bytes, name, None, &Options::default()));
+    assert!(peak < FREE + PER_BYTE * bytes.len(), "{name}: {peak} bytes");
+    clip
 }
 
 /// Reads damaged copies of `bytes`; how many of them could be read still.
@@ -177,6 +145,15 @@ fn many_skins() -> Vec<u8> {
     let skin = r#"{"joints":[0],"inverseBindMatrices":2}"#;
     let node = r#"{"name":"a node of some length"}"#;
     gltf(&[node; 20_000].join(","), &[skin; 20_000].join(","), "")
+}
+
+/// A bone that moves for `seconds`, which are more than an hour, in a file of two keys.
+fn long_take(seconds: f32) -> Vec<u8> {
+    let take = r#"{"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}],"samplers":[{"input":0,"output":1}]}"#;
+    let file = String::from_utf8(gltf("{}", r#"{"joints":[0]}"#, take)).expect("a text");
+    let codes = seconds.to_le_bytes().map(|byte| format!("%{byte:02x}"));
+    let key = format!("data:,%00%00%00%00{}", codes.concat());
+    file.replace("data:;base64,AAAAAAAAyEc=", &key).into_bytes()
 }
 
 /// A bone that moves for 28 hours among many meshes: its frames are few enough to keep, but all nodes have to be placed.
@@ -261,6 +238,38 @@ fn shared_curve_node(many: i64) -> Vec<u8> {
     fbx(|out| record(out, "Objects", &[], &[], objects), connections)
 }
 
+/// An FBX file with one curve of `keys` keys, which are the same and so take next to no bytes.
+fn packed_keys(keys: usize) -> Vec<u8> {
+    let array = |out: &mut Vec<u8>, name: &str, letter: u8, bytes: usize| {
+        let packed = miniz_oxide::deflate::compress_to_vec_zlib(&vec![0; bytes], 9);
+        let lengths = [keys as u32, 1, packed.len() as u32].map(u32::to_le_bytes);
+        let values = [&[letter][..], &lengths.concat(), &packed].concat();
+        let end = (out.len() + 13 + name.len() + values.len()) as u32;
+        out.extend([end, 1, values.len() as u32].map(u32::to_le_bytes).concat());
+        out.push(name.len() as u8);
+        out.extend(name.as_bytes());
+        out.extend(values);
+    };
+    let curve = |out: &mut Vec<u8>| {
+        array(out, "KeyTime", b'l', 8 * keys);
+        array(out, "KeyValueFloat", b'f', 4 * keys);
+    };
+    let objects = |out: &mut Vec<u8>| {
+        record(out, "AnimationStack", &[1], &["s", ""], |_| {});
+        record(out, "AnimationLayer", &[2], &["l", ""], |_| {});
+        record(out, "AnimationCurveNode", &[3], &["T", ""], |_| {});
+        record(out, "Model", &[4], &["m", "LimbNode"], |_| {});
+        record(out, "AnimationCurve", &[5], &["", ""], curve);
+    };
+    let connections = |out: &mut Vec<u8>| {
+        record(out, "C", &[2, 1], &["OO"], |_| {});
+        record(out, "C", &[3, 2], &["OO"], |_| {});
+        record(out, "C", &[3, 4], &["OP", "Lcl Translation"], |_| {});
+        record(out, "C", &[5, 3], &["OP", "d|X"], |_| {});
+    };
+    fbx(|out| record(out, "Objects", &[], &[], objects), connections)
+}
+
 /// An FBX file of `many` models whose template has as many properties.
 fn long_template(many: i64) -> Vec<u8> {
     let property = |out: &mut Vec<u8>| record(out, "P", &[], &["a name", "", "", ""], |_| {});
@@ -334,34 +343,25 @@ fn reading_costs_no_more_than_the_size_allows() {
     };
     assert!(refusal("zeros.gltf", &many_zeros()).contains("more than"));
     assert!(frugal("tiny.txt", &deepmimic("1e-300")).is_ok());
-    let (many, peak) = HEAP.peak_of(|| {
-        import::read(
-            &many_nodes(200_000),
-            "nodes.gltf",
-            None,
-            &Options::default(),
-        )
-    });
-    assert!(many.expect_err("refused").to_string().contains("at most"));
-    assert!(peak < LIST, "{peak} bytes");
-    let (few, peak) = HEAP.peak_of(|| {
-        import::read(
-            &many_nodes(131_072),
-            "nodes.gltf",
-            None,
-            &Options::default(),
-        )
-    });
-    assert!(
-        few.expect_err("refused")
-            .to_string()
-            .contains("no animation")
-    );
-    assert!(peak < LIST, "{peak} bytes");
+    let many = bearable("nodes.gltf", &many_nodes(200_000)).expect_err("refused");
+    assert!(many.to_string().contains("at most"), "{many}");
+    let few = bearable("nodes.gltf", &many_nodes(32_768)).expect_err("refused");
+    assert!(few.to_string().contains("no animation"), "{few}");
+    let takes = vec!["{}"; 131_072].join(",");
+    let still = bearable("takes.gltf", &gltf("{}", "", &takes)).expect("it imports");
+    assert_eq!(still.frames.len(), 1);
     assert!(refusal("skins.gltf", &many_skins()).contains("no animation"));
     assert!(refusal("meshes.gltf", &long_take_of_many_meshes()).contains("--trim"));
     assert!(frugal("curves.fbx", &shared_curve_node(20_000)).is_ok());
     assert!(refusal("template.fbx", &long_template(20_000)).contains("no animation"));
+    // Keys have twelve bytes each, of three MiB that any file may unpack.
+    assert!(bearable("keys.fbx", &packed_keys(250_000)).is_ok());
+    let error = bearable("keys.fbx", &packed_keys(280_000)).expect_err("refused");
+    assert!(error.to_string().contains("implausibly large"), "{error}");
+    let long = bearable("long.gltf", &long_take(4096.0)).expect("it imports");
+    assert_eq!(long.frames.len(), 122_881);
+    let longer = bearable("long.gltf", &long_take(16_384.0)).expect_err("refused");
+    assert!(longer.to_string().contains("--trim"), "{longer}");
     assert!(frugal("one.fbx", &shared_layer(1, 1000)).is_ok());
     assert!(refusal("shared.fbx", &shared_layer(4000, 1000)).contains("implausibly often"));
 }

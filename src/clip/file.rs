@@ -3,14 +3,15 @@
 //! Tensors, for J joints and F frames: `parent` i32 \[J\] (−1 for a root), `rest_translation` f32 \[J, 3\],
 //! `rest_rotation` f32 \[J, 4\], `local_translation` f32 \[F, J, 3\], `local_rotation` f32 \[F, J, 4\]; and of a part of
 //! a take `before_translation`, `before_rotation`, `after_translation`, `after_rotation`, alike. Metres, and
-//! quaternions w, x, y, z. The metadata key `mimic` holds the JSON object [`Header`].
+//! quaternions w, x, y, z. The metadata key `mimic` holds the JSON object [`Header`], in which `humanoid` is there only
+//! where the source says which joint is which bone.
 
 use super::sampling::{MOST_FPS, MOST_TRANSFORMS};
 use super::{Clip, Error, Joint, LoopMode, Margin, Problem, Source};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 const FORMAT: &str = "clip";
@@ -29,6 +30,9 @@ struct Header {
     name: String,
     fps: f64,
     joints: Vec<String>,
+    /// Joints by bone, as in [`Joint::bone`].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    humanoid: BTreeMap<String, usize>,
     #[serde(rename = "loop")]
     loop_mode: LoopMode,
     source: Source,
@@ -90,6 +94,7 @@ impl Clip {
             name: self.name.clone(),
             fps: self.fps,
             joints: self.joints.iter().map(|joint| joint.name.clone()).collect(),
+            humanoid: bones(&self.joints),
             loop_mode: self.loop_mode,
             source: self.source.clone(),
             problems: self.problems.clone(),
@@ -151,7 +156,7 @@ impl Clip {
             name: header.name,
             fps: header.fps,
             loop_mode: header.loop_mode,
-            joints: joints(header.joints, &parent, rest)?,
+            joints: joints(header.joints, header.humanoid, &parent, rest)?,
             frames,
             margin,
             source: header.source,
@@ -214,6 +219,14 @@ fn header(bytes: &[u8]) -> Result<Header, String> {
         return Err(format!("a rate of {} frames per second", header.fps));
     }
     Ok(header)
+}
+
+/// Joints by the bone that each is said to be.
+fn bones(joints: &[Joint]) -> BTreeMap<String, usize> {
+    let bones = joints.iter().enumerate();
+    bones
+        .filter_map(|(j, joint)| Some((joint.bone.clone()?, j)))
+        .collect()
 }
 
 fn parents(joints: &[Joint]) -> Result<Vec<u8>, String> {
@@ -325,6 +338,7 @@ fn rounded(at: &Isometry3<f64>) -> Isometry3<f64> {
 
 fn joints(
     names: Vec<String>,
+    bones: BTreeMap<String, usize>,
     parents: &[i32],
     rest: Vec<Isometry3<f64>>,
 ) -> Result<Vec<Joint>, String> {
@@ -340,13 +354,20 @@ fn joints(
                 }
             },
         };
-        Ok(Joint { name, parent, rest })
+        Ok(Joint {
+            name,
+            parent,
+            rest,
+            bone: None,
+        })
     };
-    names
-        .into_iter()
-        .zip(parents)
-        .zip(rest)
-        .enumerate()
-        .map(joint)
-        .collect()
+    let joints = names.into_iter().zip(parents).zip(rest).enumerate();
+    let mut joints: Vec<Joint> = joints.map(joint).collect::<Result<_, _>>()?;
+    for (bone, j) in bones {
+        let joint = joints.get_mut(j);
+        let joint =
+            joint.ok_or_else(|| format!("bone `{bone}` is joint {j}, which isn't there"))?;
+        joint.bone = Some(bone);
+    }
+    Ok(joints)
 }

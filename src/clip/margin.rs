@@ -104,6 +104,7 @@ mod tests {
         let joint = |name: &str, parent| Joint {
             name: name.to_owned(),
             parent,
+            bone: None,
             rest: Isometry3::identity(),
         };
         Clip {

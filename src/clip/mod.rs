@@ -25,6 +25,8 @@ pub struct Joint {
     pub parent: Option<usize>,
     /// Rest transform, parent from joint, in metres.
     pub rest: Isometry3<f64>,
+    /// The bone of a humanoid that the file says this is, in the words of VRM, e.g. `leftUpperLeg`.
+    pub bone: Option<String>,
 }
 
 /// What happens when the end of a clip or motion is reached.

@@ -9,6 +9,7 @@ fn arm(frames: usize, fps: f64) -> Clip {
         name: name.to_owned(),
         parent,
         rest: Isometry3::translation(0.0, 0.0, 1.0),
+        bone: None,
     };
     let frame = |f: usize| {
         let time = f as f64 / fps;
@@ -252,6 +253,30 @@ fn broken_clip_files_are_refused_with_a_reason() {
     assert!(refusal(&saved(&clip)).contains("rotation 4 is zero"));
     clip.frames.clear();
     assert!(refusal(&saved(&clip)).contains("0 frames"));
+}
+
+#[test]
+fn bones_are_in_the_file_only_where_they_are_told() {
+    let mut clip = arm(5, 30.0);
+    let has_field = |bytes: &[u8]| bytes.windows(8).any(|word| word == b"humanoid");
+    let bytes = saved(&clip);
+    assert!(
+        !has_field(&bytes),
+        "files were written so before there were bones"
+    );
+    assert_eq!(
+        Clip::from_bytes(&bytes).map(|c| c.joints).as_ref(),
+        Ok(&clip.joints)
+    );
+    clip.joints[1].bone = Some("leftUpperArm".to_owned());
+    let bytes = saved(&clip);
+    assert!(has_field(&bytes));
+    assert_eq!(
+        Clip::from_bytes(&bytes).map(|c| c.joints).as_ref(),
+        Ok(&clip.joints)
+    );
+    let bad = replaced(&bytes, r#"leftUpperArm\":1"#, r#"leftUpperArm\":2"#);
+    assert!(refusal(&bad).contains("bone `leftUpperArm` is joint 2"));
 }
 
 #[test]

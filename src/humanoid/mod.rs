@@ -1,13 +1,14 @@
 //! Humanoid slots: the joints that every humanoid has, whatever its rig calls them, and how they are found.
 //!
-//! Limbs are found by their names where these are telling, else by the shape of the rest pose; the trunk follows
-//! from the tree: hips are where the legs meet, the chest where the arms meet.
+//! What the file itself tells goes before all. Limbs are found by their names where these are telling, else by the shape
+//! of the rest pose; the trunk follows from the tree: hips are where the legs meet, the chest where the arms meet.
 
 mod file;
 mod limbs;
 mod names;
 mod shape;
 mod sides;
+mod told;
 mod tree;
 mod trunk;
 
@@ -185,15 +186,27 @@ fn list(slots: &[Slot]) -> String {
 /// by hand.
 pub fn partial(joints: &[Joint]) -> HumanoidMap {
     let tree = tree::Tree::new(joints);
-    let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
-    let mut found = HumanoidMap::default();
-    limbs::find(&tree, joints, &labels, &mut found);
-    shape::complete(&tree, &labels, &mut found);
-    trunk::find(&tree, joints, &labels, &mut found);
+    let mut found = told::find(joints);
+    let guessed = guesses(&tree, joints);
+    if found.matches.is_empty() {
+        return guessed;
+    }
+    told::supplement(&tree, &mut found, guessed);
     found
 }
 
-/// Finds the joint of every humanoid slot in a joint tree, from names first, then from the shape of the rest pose.
+/// The slots by names and shape alone.
+fn guesses(tree: &tree::Tree, joints: &[Joint]) -> HumanoidMap {
+    let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
+    let mut found = HumanoidMap::default();
+    limbs::find(tree, joints, &labels, &mut found);
+    shape::complete(tree, &labels, &mut found);
+    trunk::find(tree, joints, &labels, &mut found);
+    found
+}
+
+/// Finds the joint of every humanoid slot in a joint tree: those that the file tells, then from names, then from the
+/// shape of the rest pose.
 ///
 /// # Errors
 /// [`NotHumanoid`] when a required slot stays empty or the figure stands on four legs.

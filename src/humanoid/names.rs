@@ -29,6 +29,8 @@ pub(super) struct Label {
     pub side: Option<Side>,
     /// The name's words without prefix, side and number, written as one: `upperleg`.
     pub core: String,
+    /// It stands in no slot: an end, a finger, a helper.
+    pub is_foreign: bool,
 }
 
 /// Words of joints that stand in no slot: fingers, faces, ends, helpers of a rig.
@@ -161,14 +163,16 @@ fn sided(core: &str) -> &'static [(Part, f64)] {
 /// What the core of a name without side means.
 fn central(core: &str) -> Option<(Part, f64)> {
     match core {
-        "hips" | "hip" | "pelvis" | "下半身" => Some((Part::Hips, 1.0)),
+        "hips" | "hip" | "pelvis" | "bassin" | "下半身" => Some((Part::Hips, 1.0)),
         "spine" | "chest" | "upperchest" | "torso" | "abdomen" | "thorax" | "waist" | "back"
-        | "lowerback" | "upperback" | "body" | "ribcage" | "上半身" => Some((Part::Trunk, 1.0)),
-        "neck" | "首" => Some((Part::Neck, 1.0)),
+        | "lowerback" | "upperback" | "body" | "ribcage" | "torse" | "上半身" => {
+            Some((Part::Trunk, 1.0))
+        }
+        "neck" | "cou" | "首" => Some((Part::Neck, 1.0)),
         // Parts of a neck, where there is no joint for the whole of it.
         "lowerneck" => Some((Part::Neck, 0.9)),
         "upperneck" => Some((Part::Neck, 0.8)),
-        "head" | "skull" | "頭" => Some((Part::Head, 1.0)),
+        "head" | "skull" | "tête" | "頭" => Some((Part::Head, 1.0)),
         _ => None,
     }
 }
@@ -192,13 +196,18 @@ impl Label {
                 core.push_str(rest);
             }
         }
-        Label { side, core }
+        Label {
+            side,
+            core,
+            is_foreign: false,
+        }
     }
 
     fn foreign() -> Label {
         Label {
             side: None,
             core: String::new(),
+            is_foreign: true,
         }
     }
 

@@ -14,25 +14,25 @@ const LIKE_BONE: f64 = 0.5;
 /// Branches of one joint that are compared.
 const BRANCHES: usize = 16;
 
-const LEFT_LEG: [Slot; 4] = [
+pub(super) const LEFT_LEG: [Slot; 4] = [
     Slot::LeftUpperLeg,
     Slot::LeftLowerLeg,
     Slot::LeftFoot,
     Slot::LeftToes,
 ];
-const RIGHT_LEG: [Slot; 4] = [
+pub(super) const RIGHT_LEG: [Slot; 4] = [
     Slot::RightUpperLeg,
     Slot::RightLowerLeg,
     Slot::RightFoot,
     Slot::RightToes,
 ];
-const LEFT_ARM: [Slot; 4] = [
+pub(super) const LEFT_ARM: [Slot; 4] = [
     Slot::LeftShoulder,
     Slot::LeftUpperArm,
     Slot::LeftLowerArm,
     Slot::LeftHand,
 ];
-const RIGHT_ARM: [Slot; 4] = [
+pub(super) const RIGHT_ARM: [Slot; 4] = [
     Slot::RightShoulder,
     Slot::RightUpperArm,
     Slot::RightLowerArm,
@@ -321,14 +321,18 @@ fn arms(
         .into_iter()
         .filter(|pair| pair.iter().all(|b| !in_leg(b.joints[0])) && across(pair))
         .max_by(|a, b| a[0].length.total_cmp(&b[0].length))?;
-    let [a, b] = [arm_joints(tree, &best[0]), arm_joints(tree, &best[1])];
+    // A clavicle begins nearer to the middle than a leg does; what begins farther out is an upper arm.
+    let apart = |a: usize, b: usize| tree.span(a, b).norm();
+    let inside = apart(best[0].joints[0], best[1].joints[0]) < apart(left, right);
+    let [a, b] = [0, 1].map(|i| arm_joints(tree, &best[i], inside));
     let across = (end(tree, &best[0]) - end(tree, &best[1])).dot(&side);
     let leads = named_first(labels, &best).unwrap_or(across > 0.0);
     Some(if leads { [a, b] } else { [b, a] })
 }
 
-/// Clavicle, upper arm, lower arm and hand of a branch, which ends where the fingers begin.
-fn arm_joints(tree: &Tree, branch: &Branch) -> [Option<usize>; 4] {
+/// Clavicle, upper arm, lower arm and hand of a branch, which ends where the fingers begin, and which may begin with a
+/// clavicle where it starts `inside`.
+fn arm_joints(tree: &Tree, branch: &Branch, inside: bool) -> [Option<usize>; 4] {
     let joints = &branch.joints;
     let fingers = joints
         .iter()
@@ -340,7 +344,7 @@ fn arm_joints(tree: &Tree, branch: &Branch) -> [Option<usize>; 4] {
         (Some(a), Some(b)) => tree.span(a, b).norm(),
         _ => 0.0,
     };
-    let clavicle = count >= 4 && long(0) < 0.7 * long(1);
+    let clavicle = inside && count >= 4 && long(0) < 0.7 * long(1);
     if clavicle {
         [at(0), at(1), at(2), at(3)]
     } else {

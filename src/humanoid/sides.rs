@@ -17,7 +17,7 @@ const WORDS: [(&str, &str); 8] = [
 ];
 
 /// Pairs of left and right joints: those that stand in slots of both sides, and those outside the map, such as fingers,
-/// whose names are the same but for the side.
+/// whose names, or what the file calls their bones, are the same but for the side.
 pub fn pairs(joints: &[Joint], map: &HumanoidMap) -> Vec<(usize, usize)> {
     let mut pairs: Vec<(usize, usize)> = Slot::ALL
         .into_iter()
@@ -32,11 +32,14 @@ pub fn pairs(joints: &[Joint], map: &HumanoidMap) -> Vec<(usize, usize)> {
             *paired = true;
         }
     }
-    let names = unique(joints);
+    let names = unique(joints, |joint| Some(&joint.name));
+    let bones = unique(joints, |joint| joint.bone.as_deref());
     for (left, joint) in joints.iter().enumerate() {
-        let right = mirrored_names(&joint.name)
-            .into_iter()
-            .find_map(|name| names.get(name.as_str()).copied().flatten());
+        let bone = joint.bone.iter().flat_map(|bone| mirrored_names(bone));
+        let bone = bone.map(|bone| bones.get(bone.as_str()));
+        let name = mirrored_names(&joint.name).into_iter();
+        let name = name.map(|name| names.get(name.as_str()));
+        let right = bone.chain(name).find_map(|found| found.copied().flatten());
         if let Some(right) = right.filter(|&right| !paired[left] && !paired[right]) {
             (paired[left], paired[right]) = (true, true);
             pairs.push((left, right));
@@ -59,13 +62,18 @@ impl Slot {
 }
 
 /// The joint of each name; `None` where several have it.
-fn unique(joints: &[Joint]) -> BTreeMap<&str, Option<usize>> {
+fn unique<'a>(
+    joints: &'a [Joint],
+    name: impl Fn(&'a Joint) -> Option<&'a str>,
+) -> BTreeMap<&'a str, Option<usize>> {
     let mut names = BTreeMap::new();
     for (j, joint) in joints.iter().enumerate() {
-        names
-            .entry(joint.name.as_str())
-            .and_modify(|place| *place = None)
-            .or_insert(Some(j));
+        if let Some(name) = name(joint) {
+            names
+                .entry(name)
+                .and_modify(|place| *place = None)
+                .or_insert(Some(j));
+        }
     }
     names
 }

@@ -105,12 +105,13 @@ fn neck_and_head(
             let reason = format!("`{}` is the only joint above the chest", joints[neck].name);
             found.insert(Slot::Head, neck, 0.9, reason);
         }
-        (None, None) => by_place(tree, found, chest),
+        (None, None) => by_place(tree, labels, found, chest),
     }
 }
 
-/// The branch of the chest that holds no arm: its first joint is the neck and its second the head.
-fn by_place(tree: &Tree, found: &mut HumanoidMap, chest: usize) {
+/// The branch of the chest that holds no arm: its first joint is the neck and its second the head, unless that is no more
+/// than the end of the first.
+fn by_place(tree: &Tree, labels: &[Label], found: &mut HumanoidMap, chest: usize) {
     let arms = [Slot::LeftUpperArm, Slot::RightUpperArm].map(|slot| found.joint(slot));
     let holds_arm = |j: usize| {
         arms.iter()
@@ -122,7 +123,8 @@ fn by_place(tree: &Tree, found: &mut HumanoidMap, chest: usize) {
         return;
     };
     let reason = "its place above the chest".to_owned();
-    match tree.children[first].first() {
+    let second = tree.children[first].first();
+    match second.filter(|second| !labels[**second].is_foreign) {
         Some(&second) => {
             found.insert(Slot::Neck, first, 0.5, reason.clone());
             found.insert(Slot::Head, second, 0.5, reason);

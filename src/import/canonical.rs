@@ -123,10 +123,14 @@ impl<'a> Rig<'a> {
 
     fn rest_joints(&self, rest: Option<(usize, f64)>) -> Result<Vec<Joint>, Error> {
         let locals = self.locals(&self.world(rest, None)?);
-        let joint = |(j, rest): (usize, Isometry3<f64>)| Joint {
-            name: self.scene.nodes()[self.nodes[j]].name.clone(),
-            parent: self.parents[j],
-            rest,
+        let joint = |(j, rest): (usize, Isometry3<f64>)| {
+            let node = &self.scene.nodes()[self.nodes[j]];
+            Joint {
+                name: node.name.clone(),
+                parent: self.parents[j],
+                rest,
+                bone: node.bone.clone(),
+            }
         };
         Ok(locals.into_iter().enumerate().map(joint).collect())
     }
@@ -146,7 +150,7 @@ impl<'a> Rig<'a> {
             self.frame.axes = up.canonical_from_file();
             self.joints = self.rest_joints(rest)?;
             self.problems
-                .push(upright::problem(self.scene.up_axis(), up));
+                .push(upright::problem(&self.scene.contents().up_axis, up));
             self.other_up = Some(up);
         }
         Ok(())

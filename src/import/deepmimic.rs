@@ -1,8 +1,8 @@
 //! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one fixed humanoid.
 
-use super::scene::{Node, Scene, Take};
+use super::scene::{Contents, Node, Scene, Take, composed};
 use crate::clip::{MOST_FPS, Problem, Severity, slerp};
-use nalgebra::{Matrix3, Matrix4, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
 /// Numbers in one frame: duration, root position, root rotation, then the joints in the order of [`JOINTS`].
 const ROW: usize = 44;
@@ -108,10 +108,8 @@ struct File {
 
 /// A DeepMimic motion on its humanoid.
 pub(crate) struct DeepMimicScene {
-    nodes: Vec<Node>,
-    takes: Vec<Take>,
+    contents: Contents,
     poses: Vec<Pose>,
-    problems: Vec<Problem>,
 }
 
 /// Reads a motion file. `name` becomes the take's name, since the format has none.
@@ -123,8 +121,6 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimic
     let wraps = loop_word(file.loops.as_deref(), &mut problems);
     let end = poses.last().map_or(0.0, |pose| pose.time);
     let take = Take {
-        name: name.to_owned(),
-        start: 0.0,
         end,
         fps: rate(&poses),
         animated: (0..JOINTS.len())
@@ -132,25 +128,20 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimic
             .collect(),
         wraps,
         channels: JOINTS.len(),
-        problems: Vec::new(),
-        fault: None,
+        ..Take::still(name.to_owned())
     };
+    let nodes = JOINTS
+        .iter()
+        .map(|d| Node::bone(d.name.to_owned(), d.parent));
     Ok(DeepMimicScene {
-        nodes: nodes(),
-        takes: vec![take],
+        contents: Contents {
+            // X forward already: the usual turn would be wrong.
+            canonical_from_file: Matrix3::new(1., 0., 0., 0., 0., -1., 0., 1., 0.),
+            problems,
+            ..Contents::new("deepmimic", nodes.collect(), vec![take])
+        },
         poses,
-        problems,
     })
-}
-
-fn nodes() -> Vec<Node> {
-    let node = |d: &Definition| Node {
-        name: d.name.to_owned(),
-        parent: d.parent,
-        is_bone: true,
-        is_plain: true,
-    };
-    JOINTS.iter().map(node).collect()
 }
 
 fn loop_word(word: Option<&str>, problems: &mut Vec<Problem>) -> Option<bool> {
@@ -269,31 +260,11 @@ impl DeepMimicScene {
 }
 
 impl Scene for DeepMimicScene {
-    fn format(&self) -> &'static str {
-        "deepmimic"
+    fn contents(&self) -> &Contents {
+        &self.contents
     }
 
-    fn nodes(&self) -> &[Node] {
-        &self.nodes
-    }
-
-    fn takes(&self) -> &[Take] {
-        &self.takes
-    }
-
-    fn up_axis(&self) -> &str {
-        "+Y"
-    }
-
-    fn unit_m(&self) -> f64 {
-        1.0
-    }
-
-    fn canonical_from_file(&self) -> Matrix3<f64> {
-        Matrix3::new(1., 0., 0., 0., 0., -1., 0., 1., 0.)
-    }
-
-    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
         let (root, rotations) = match at {
             Some((_, time)) => self.pose_at(time),
             None => (
@@ -301,18 +272,14 @@ impl Scene for DeepMimicScene {
                 vec![UnitQuaternion::identity(); JOINTS.len()],
             ),
         };
-        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(JOINTS.len());
-        for (definition, rotation) in JOINTS.iter().zip(&rotations) {
-            let parent = definition
-                .parent
-                .map_or(Translation3::from(root).to_homogeneous(), |p| world[p]);
-            let offset = Translation3::from(Vector3::from(definition.offset)).to_homogeneous();
-            world.push(parent * offset * rotation.to_homogeneous());
-        }
-        world
-    }
-
-    fn problems(&self) -> &[Problem] {
-        &self.problems
+        let local = |(definition, rotation): (&Definition, &UnitQuaternion<f64>)| {
+            let offset = Vector3::from(definition.offset);
+            let place = definition.parent.map_or(root + offset, |_| offset);
+            Isometry3::from_parts(place.into(), *rotation).to_homogeneous()
+        };
+        composed(
+            &self.contents.nodes,
+            JOINTS.iter().zip(&rotations).map(local),
+        )
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Er
     let default_take = (!scene.takes().is_empty()).then(|| take::most_motion(scene));
     let first = default_take.map(|take| (take, scene.takes()[take].start));
     let rig = Rig::new(scene, file, frame(scene, file, &Options::default())?, first)?;
-    let mut problems = scene.problems().to_vec();
+    let mut problems = scene.contents().problems.clone();
     problems.extend(scene.takes().iter().flat_map(|take| take.problems.clone()));
     problems.extend(scene.takes().iter().filter_map(broken_take));
     problems.extend(rig.problems);
@@ -44,18 +44,18 @@ pub(super) fn inspection(scene: &dyn Scene, file: &str) -> Result<Inspection, Er
         problems.push(Problem {
             id: "no-takes".to_owned(),
             severity: Severity::Error,
-            message: format!("the file {}", scene.no_takes()),
+            message: format!("the file {}", scene.contents().no_takes),
         });
     }
     Ok(Inspection {
-        format: scene.format().to_owned(),
+        format: scene.contents().format.to_owned(),
         takes: scene.takes().iter().map(take_info).collect(),
         default_take,
         joints: rig.joints,
         up_axis: rig
             .other_up
-            .map_or_else(|| scene.up_axis().to_owned(), |up| up.to_string()),
-        unit_m: scene.unit_m(),
+            .map_or_else(|| scene.contents().up_axis.clone(), |up| up.to_string()),
+        unit_m: scene.contents().unit_m,
         problems,
     })
 }

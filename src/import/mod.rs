@@ -50,7 +50,7 @@ const MOST_BYTES: u64 = 2 << 30;
 
 /// Frames × joints that any file may be sampled to, and how many more per byte of it: a few bytes can tell of hours,
 /// but motion that fills them takes more.
-const FREE_TRANSFORMS: usize = 1 << 20;
+const FREE_TRANSFORMS: usize = 1 << 18;
 const TRANSFORMS_PER_BYTE: f64 = 0.5;
 
 /// How a file is to be read, where it shouldn't decide itself.
@@ -99,7 +99,7 @@ pub fn read(
 ) -> Result<Clip, Error> {
     let scene = open(bytes, file, folder)?;
     let (take, note) = take::choose(scene.as_ref(), file, options.take.as_deref())?;
-    let read = bytes.len().saturating_add(scene.bytes_beside());
+    let read = bytes.len().saturating_add(scene.contents().bytes_beside);
     let most = FREE_TRANSFORMS + (read as f64 * TRANSFORMS_PER_BYTE) as usize;
     let mut clip = clip(scene.as_ref(), file, take, options, most)?;
     if options.mirror {
@@ -173,7 +173,7 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
 }
 
 fn frame(scene: &dyn Scene, file: &str, options: &Options) -> Result<Frame, Error> {
-    let unit_m = options.unit_m.unwrap_or_else(|| scene.unit_m());
+    let unit_m = options.unit_m.unwrap_or_else(|| scene.contents().unit_m);
     if !(unit_m > 0.0 && unit_m.is_finite()) {
         return Err(Error::Unit {
             file: file.to_owned(),
@@ -181,8 +181,8 @@ fn frame(scene: &dyn Scene, file: &str, options: &Options) -> Result<Frame, Erro
         });
     }
     let axes = match options.up {
-        Some(up) if up.to_string() != scene.up_axis() => up.canonical_from_file(),
-        _ => scene.canonical_from_file(),
+        Some(up) if up.to_string() != scene.contents().up_axis => up.canonical_from_file(),
+        _ => scene.contents().canonical_from_file,
     };
     let is_sure = options.up.is_some();
     Ok(Frame {
@@ -218,7 +218,7 @@ fn clip(
     }
     let after = world.split_off(part.own.end);
     let before: Vec<_> = world.drain(..part.own.start).collect();
-    let mut problems = scene.problems().to_vec();
+    let mut problems = scene.contents().problems.clone();
     problems.extend_from_slice(&about.problems);
     problems.extend((leads_nowhere && options.trim.is_none()).then(lead::problem));
     problems.extend(sampling_problems(part.fps, fps, &world));
@@ -253,14 +253,14 @@ fn clip(
         source: Source {
             file: file.to_owned(),
             sha256: String::new(),
-            format: scene.format().to_owned(),
+            format: scene.contents().format.to_owned(),
             take: about.name.clone(),
             fps: about.fps,
             up_axis: options
                 .up
                 .or(rig.other_up)
-                .map_or_else(|| scene.up_axis().to_owned(), |up| up.to_string()),
-            unit_m: options.unit_m.unwrap_or_else(|| scene.unit_m()),
+                .map_or_else(|| scene.contents().up_axis.clone(), |up| up.to_string()),
+            unit_m: options.unit_m.unwrap_or_else(|| scene.contents().unit_m),
         },
         problems,
     })

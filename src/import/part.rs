@@ -7,6 +7,8 @@ use std::ops::Range;
 
 /// Nodes or channels that may be looked at for each transform: most of a file's nodes may be no joints.
 const LOOKS_PER_TRANSFORM: usize = 8;
+/// Joints that a frame counts for at least, as it takes memory of its own.
+const LEAST_JOINTS: usize = 2;
 
 /// Parts of a frame by which a part may miss frames of the whole take and still be of these frames.
 const ON_FRAME: f64 = 0.01;
@@ -115,7 +117,7 @@ pub(super) fn most_frames(
 ) -> usize {
     let transforms = transforms.min(MOST_TRANSFORMS);
     let looks = scene.nodes().len().max(take.channels);
-    let kept = transforms / joints.max(1);
+    let kept = transforms / joints.max(LEAST_JOINTS);
     kept.min(transforms.saturating_mul(LOOKS_PER_TRANSFORM) / looks.max(1))
 }
 

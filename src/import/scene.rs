@@ -1,5 +1,6 @@
 //! What a reader gives to the importer: a tree of nodes, its takes, and where every node is at any time.
 
+use super::UpAxis;
 use crate::clip::Problem;
 use nalgebra::{Matrix3, Matrix4};
 
@@ -12,6 +13,21 @@ pub(crate) struct Node {
     pub is_bone: bool,
     /// The file holds nothing but transforms in it (no mesh, camera or light).
     pub is_plain: bool,
+    /// The bone of a humanoid that the file says this is, as in [`Joint::bone`](crate::clip::Joint::bone).
+    pub bone: Option<String>,
+}
+
+impl Node {
+    /// A bone of a format that has nothing else.
+    pub fn bone(name: String, parent: Option<usize>) -> Self {
+        Self {
+            name,
+            parent,
+            is_bone: true,
+            is_plain: true,
+            bone: None,
+        }
+    }
 }
 
 /// One animation of the file.
@@ -53,28 +69,79 @@ impl Take {
     }
 }
 
-/// An animation file after parsing. Nothing in it can be out of range any more.
-pub(crate) trait Scene {
+/// What a file holds, but for its motion. Nothing in it can be out of range any more.
+#[derive(Debug)]
+pub(crate) struct Contents {
     /// `fbx`, `gltf`, `bvh`, `asf`, `amc` or `deepmimic`.
-    fn format(&self) -> &'static str;
-    fn nodes(&self) -> &[Node];
-    fn takes(&self) -> &[Take];
-    /// What a file without takes lacks, and what to do.
-    fn no_takes(&self) -> &'static str {
-        "holds no animation; export it with at least one take"
-    }
+    pub format: &'static str,
+    pub nodes: Vec<Node>,
+    pub takes: Vec<Take>,
+    /// What the file lacks if it has no takes, and what to do.
+    pub no_takes: &'static str,
     /// Up axis of the file's coordinates, e.g. `+Y`.
-    fn up_axis(&self) -> &str;
+    pub up_axis: String,
     /// Metres per unit of the file's coordinates.
-    fn unit_m(&self) -> f64;
+    pub unit_m: f64,
     /// Rotation (or, for left-handed data, reflection) from the file's axes to Z up, X forward, Y left.
-    fn canonical_from_file(&self) -> Matrix3<f64>;
-    /// World matrices of all nodes, in the file's axes and units: at `time` seconds of `take`, or at rest.
-    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>>;
+    pub canonical_from_file: Matrix3<f64>,
+    /// World matrices at rest, where that isn't how the nodes stand.
+    pub bound: Option<Vec<Matrix4<f64>>>,
     /// What the reader found wrong, or left out, in the file, whichever take is used.
-    fn problems(&self) -> &[Problem];
+    pub problems: Vec<Problem>,
     /// Bytes that were read from other files.
-    fn bytes_beside(&self) -> usize {
-        0
+    pub bytes_beside: usize,
+}
+
+impl Contents {
+    /// Contents in metres with Y up, without a problem.
+    pub fn new(format: &'static str, nodes: Vec<Node>, takes: Vec<Take>) -> Self {
+        let up = UpAxis::PlusY;
+        Self {
+            format,
+            nodes,
+            takes,
+            no_takes: "holds no animation; export it with at least one take",
+            up_axis: up.to_string(),
+            unit_m: 1.0,
+            canonical_from_file: up.canonical_from_file(),
+            bound: None,
+            problems: Vec::new(),
+            bytes_beside: 0,
+        }
     }
+}
+
+/// An animation file after parsing.
+pub(crate) trait Scene {
+    fn contents(&self) -> &Contents;
+    /// World matrices of all nodes, in the file's axes and units: at `time` seconds of `take`, or as they stand.
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>>;
+
+    /// The same, at rest where there is no `at`.
+    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        match (at, &self.contents().bound) {
+            (None, Some(bound)) => bound.clone(),
+            _ => self.placed(at),
+        }
+    }
+
+    fn nodes(&self) -> &[Node] {
+        &self.contents().nodes
+    }
+
+    fn takes(&self) -> &[Take] {
+        &self.contents().takes
+    }
+}
+
+/// World matrices of nodes from those in their parents.
+pub(crate) fn composed(
+    nodes: &[Node],
+    locals: impl Iterator<Item = Matrix4<f64>>,
+) -> Vec<Matrix4<f64>> {
+    let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(nodes.len());
+    for (node, local) in nodes.iter().zip(locals) {
+        world.push(node.parent.map_or(local, |parent| world[parent] * local));
+    }
+    world
 }

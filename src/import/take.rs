@@ -24,7 +24,7 @@ pub(crate) fn choose(
     if scene.takes().is_empty() {
         return Err(Error::NoTakes {
             file: file.to_owned(),
-            reason: scene.no_takes(),
+            reason: scene.contents().no_takes,
         });
     }
     let unknown = |wanted: &str| Error::UnknownTake {

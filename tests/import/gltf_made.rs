@@ -46,6 +46,34 @@ pub fn base64(bytes: &[u8]) -> String {
     text
 }
 
+#[test]
+fn percent_encoded_buffers_are_read_as_base64_ones_are() {
+    let of = |uri: &dyn Fn(&[u8]) -> String| {
+        let half = std::f32::consts::FRAC_1_SQRT_2;
+        let floats = [0.0_f32, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half];
+        let bytes: Vec<u8> = floats.iter().flat_map(|x| x.to_le_bytes()).collect();
+        read(&synthetic(|file| {
+            file["buffers"][0]["uri"] = uri(&bytes).into()
+        }))
+    };
+    let coded = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .map(|b| format!("%{b:02X}"))
+            .collect::<String>()
+    };
+    let clip = of(&|bytes| format!("data:,{}", coded(bytes))).expect("it imports");
+    let same = of(&|bytes| format!("data:;base64,{}", base64(bytes))).expect("it imports");
+    assert_eq!(clip.frames, same.frames);
+    let error = of(&|bytes| format!("data:,{}%", coded(bytes))).expect_err("it is cut");
+    assert!(
+        error
+            .to_string()
+            .contains("buffer 0: its data URI has a `%`"),
+        "{error}"
+    );
+}
+
 pub(super) fn synthetic_file() -> String {
     synthetic(|_| {})
 }

@@ -18,6 +18,7 @@ mod gltf_made;
 mod gltf_reference;
 mod maps;
 mod robust;
+mod told;
 
 use std::path::{Path, PathBuf};
 

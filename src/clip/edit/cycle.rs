@@ -152,7 +152,7 @@ impl Clip {
 
 fn gap_problem(part: &Loop) -> Option<Problem> {
     (part.gap > NOTICEABLE).then(|| Problem {
-        id: "loop-gap".to_owned(),
+        id: "cycle-gap".to_owned(),
         severity: Severity::Warning,
         message: format!(
             "even the best cycle doesn't close: pose and velocity at its ends differ by {:.0} % of how far they change; \

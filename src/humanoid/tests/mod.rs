@@ -16,6 +16,7 @@ fn figure(joints: &[(&str, &str, [f64; 3])]) -> Vec<Joint> {
             name: (*name).to_owned(),
             parent: up,
             rest: Isometry3::translation(offset.x, offset.y, offset.z),
+            bone: None,
         }
     };
     joints.iter().map(build).collect()
@@ -200,6 +201,7 @@ fn hostile_trees_cost_no_more_than_their_size() {
             j.checked_sub(1)
         },
         rest: Isometry3::translation(0.0, 0.0, f64::NAN),
+        bone: None,
     };
     let joints: Vec<Joint> = (0..20_000).map(arm).collect();
     assert!(map(&joints).is_err());

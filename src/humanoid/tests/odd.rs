@@ -23,6 +23,7 @@ fn bvh_joints(file: &str, turn: fn([f64; 3]) -> [f64; 3]) -> Option<Vec<Joint>> 
                     name: name.to_owned(),
                     parent: open.last().copied().flatten(),
                     rest: Isometry3::identity(),
+                    bone: None,
                 });
             }
             ["End", ..] => next = None,

@@ -150,6 +150,7 @@ fn deepmimic_joints() -> Option<Vec<Joint>> {
             -number(joint, "AttachZ"),
             number(joint, "AttachY"),
         ),
+        bone: None,
     };
     Some(joints.iter().map(build).collect())
 }

@@ -8,13 +8,12 @@ mod asf;
 mod beside;
 mod lines;
 
-use super::UpAxis;
 use super::measure;
-use super::scene::{Node, Scene, Take};
+use super::scene::{Contents, Node, Scene, Take, composed};
 use crate::clip::{Problem, Severity, slerp};
 use amc::Motion;
 use asf::{Bone, Freedom, Skeleton};
-use nalgebra::{Isometry3, Matrix3, Matrix4, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
 /// Rate of the CMU motion capture database, Hz: AMC files don't state theirs.
@@ -44,19 +43,19 @@ pub enum AcclaimError {
 
 /// A skeleton and, from an AMC file, its motion.
 pub(crate) struct AcclaimScene {
+    contents: Contents,
     skeleton: Skeleton,
-    nodes: Vec<Node>,
     motion: Option<Motion>,
-    takes: Vec<Take>,
-    unit_m: f64,
-    problems: Vec<Problem>,
-    bytes_beside: usize,
 }
 
 /// Reads a skeleton, which has no take.
 pub(crate) fn read_asf(bytes: &[u8]) -> Result<AcclaimScene, AcclaimError> {
     let skeleton = asf::read(&String::from_utf8_lossy(bytes))?;
-    Ok(scene(skeleton, None, 0))
+    Ok(AcclaimScene {
+        contents: contents("asf", &skeleton, Vec::new()),
+        skeleton,
+        motion: None,
+    })
 }
 
 /// Reads the motion in the file called `file`, whose skeleton is looked for in `folder`. `name` becomes the take's name,
@@ -75,28 +74,27 @@ pub(crate) fn read_amc(
         source: Box::new(source),
     })?;
     let motion = amc::read(&String::from_utf8_lossy(bytes), &skeleton)?;
-    let take = take(name, &motion);
-    let mut scene = scene(skeleton, Some(motion), bytes_beside);
-    scene.takes.push(take);
-    Ok(scene)
+    let takes = vec![take(name, &motion)];
+    let contents = Contents {
+        bytes_beside,
+        ..contents("amc", &skeleton, takes)
+    };
+    Ok(AcclaimScene {
+        contents,
+        skeleton,
+        motion: Some(motion),
+    })
 }
 
-fn scene(skeleton: Skeleton, motion: Option<Motion>, bytes_beside: usize) -> AcclaimScene {
+fn contents(format: &'static str, skeleton: &Skeleton, takes: Vec<Take>) -> Contents {
+    let bones = skeleton.bones.iter();
+    let nodes = bones.map(|bone| Node::bone(bone.name.clone(), bone.parent));
     let (unit_m, problem) = measure::unit(skeleton.unit_m, &rest(&skeleton.bones));
-    let node = |bone: &Bone| Node {
-        name: bone.name.clone(),
-        parent: bone.parent,
-        is_bone: true,
-        is_plain: true,
-    };
-    AcclaimScene {
-        nodes: skeleton.bones.iter().map(node).collect(),
-        skeleton,
-        motion,
-        takes: Vec::new(),
+    Contents {
         unit_m,
         problems: Vec::from_iter(problem),
-        bytes_beside,
+        no_takes: "is a skeleton without motion; give one of the .amc files that belong to it",
+        ..Contents::new(format, nodes.collect(), takes)
     }
 }
 
@@ -183,56 +181,17 @@ impl AcclaimScene {
 }
 
 impl Scene for AcclaimScene {
-    fn format(&self) -> &'static str {
-        match self.motion {
-            Some(_) => "amc",
-            None => "asf",
-        }
+    fn contents(&self) -> &Contents {
+        &self.contents
     }
 
-    fn nodes(&self) -> &[Node] {
-        &self.nodes
-    }
-
-    fn takes(&self) -> &[Take] {
-        &self.takes
-    }
-
-    fn no_takes(&self) -> &'static str {
-        "is a skeleton without motion; give one of the .amc files that belong to it"
-    }
-
-    fn up_axis(&self) -> &str {
-        "+Y"
-    }
-
-    fn unit_m(&self) -> f64 {
-        self.unit_m
-    }
-
-    fn canonical_from_file(&self) -> Matrix3<f64> {
-        UpAxis::PlusY.canonical_from_file()
-    }
-
-    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
         let bones = &self.skeleton.bones;
         let locals = match (&self.motion, at) {
             (Some(motion), Some((_, time))) => self.locals_at(motion, time),
             _ => bones.iter().map(|bone| local(bone, &[])).collect(),
         };
-        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(bones.len());
-        for (bone, local) in bones.iter().zip(locals) {
-            let local = local.to_homogeneous();
-            world.push(bone.parent.map_or(local, |parent| world[parent] * local));
-        }
-        world
-    }
-
-    fn problems(&self) -> &[Problem] {
-        &self.problems
-    }
-
-    fn bytes_beside(&self) -> usize {
-        self.bytes_beside
+        let locals = locals.iter().map(Isometry3::to_homogeneous);
+        composed(&self.contents.nodes, locals)
     }
 }

@@ -157,7 +157,7 @@ fn check_moment(
     compare(
         &ours(scene, Some((index, time))),
         &theirs(&evaluated),
-        scene.unit_m(),
+        scene.contents().unit_m,
         place,
     )
 }
@@ -169,7 +169,7 @@ fn check(file: &str) {
     let mut worst = compare(
         &ours(&scene, None),
         &theirs(&oracle),
-        scene.unit_m(),
+        scene.contents().unit_m,
         &format!("{file} at rest"),
     );
     assert_eq!(

@@ -3,17 +3,16 @@
 use super::settings::Settings;
 use super::takes::{first_sane, rate, span_problems};
 use super::transform::{Inherit, Local, Property, World};
-use super::{FbxError, bound, constraints_left_out};
-use crate::clip::Problem;
+use super::{FbxError, bound, constraints_left_out, contents};
 use crate::import::bind::Binds;
-use crate::import::scene::{Node, Scene, Take};
+use crate::import::scene::{Contents, Node, Scene, Take};
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::time::{Duration, Instant};
 use ufbx::{AllocatorOpts, ElementType, LoadOpts, OpenFileCb, ProgressCb, ProgressResult};
 
 /// Bytes that any file may make ufbx take, and how many more per byte of it, for what it keeps and for what it needs
-/// on the way, each.
-const FREE_BYTES: usize = 64 << 20;
+/// on the way, each. It takes them from Rust's allocator.
+const FREE_BYTES: usize = 8 << 20;
 const BYTES_PER_BYTE: usize = 32;
 /// Most time for reading, and bytes after which it is looked at. Files of a gigabyte take seconds.
 const MOST_TIME: Duration = Duration::from_secs(60);
@@ -33,25 +32,20 @@ const PLAIN: [ElementType; 4] = [
 
 /// A file as ufbx has read it.
 pub(super) struct UfbxScene {
+    contents: Contents,
     scene: ufbx::SceneRoot,
-    nodes: Vec<Node>,
     /// ufbx's number of every node.
     ids: Vec<usize>,
-    takes: Vec<Take>,
-    settings: Settings,
-    /// World matrices at rest, where that isn't how the nodes stand.
-    bound: Option<Vec<Matrix4<f64>>>,
-    problems: Vec<Problem>,
+    /// Ticks per second.
+    ticks: f64,
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
     let scene = load(bytes)?;
     let settings = settings(&scene);
     let (nodes, ids) = tree(&scene);
-    let mut problems = settings.problems.clone();
-    if !scene.constraints.is_empty() {
-        problems.push(constraints_left_out());
-    }
+    let constrained = !scene.constraints.is_empty();
+    let problems = constrained.then(constraints_left_out);
     let mut places = vec![None; scene.nodes.len()];
     for (at, &id) in ids.iter().enumerate() {
         places[id] = Some(at);
@@ -63,18 +57,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
         .collect();
     let binds = binds(&scene, &nodes, &places);
     let mut scene = UfbxScene {
+        ticks: settings.ticks,
+        contents: contents(settings, nodes, takes, Vec::from_iter(problems)),
         scene,
-        nodes,
         ids,
-        takes,
-        settings,
-        bound: None,
-        problems,
     };
-    if !binds.is_empty() {
-        let found = bound(&scene.nodes, &scene.placed(None), &scene.settings, binds);
-        scene.problems.extend(found.iter().map(|(_, p)| p.clone()));
-        scene.bound = found.map(|(world, _)| world);
+    if let Some((world, problem)) = bound(&scene, binds) {
+        scene.contents.bound = Some(world);
+        scene.contents.problems.push(problem);
     }
     Ok(scene)
 }
@@ -138,6 +128,7 @@ fn tree(scene: &ufbx::Scene) -> (Vec<Node>, Vec<usize>) {
             parent,
             is_bone: node.bone.is_some(),
             is_plain: is_plain(node),
+            bone: None,
         });
         ids.push(id);
     }
@@ -292,19 +283,27 @@ fn inherit(node: &ufbx::Node) -> Inherit {
     }
 }
 
-impl UfbxScene {
-    /// World matrices of all nodes at `at`, or as they stand in the file. Times are taken to the nearest tick of the
-    /// file's clock, so that a frame meets its keys exactly.
+impl Scene for UfbxScene {
+    fn contents(&self) -> &Contents {
+        &self.contents
+    }
+
+    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
     fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        let ticks = self.settings.ticks;
-        let usable = |take: usize| self.takes.get(take).is_some_and(|t| t.fault.is_none());
+        let ticks = self.ticks;
+        let usable = |take: usize| {
+            self.contents
+                .takes
+                .get(take)
+                .is_some_and(|t| t.fault.is_none())
+        };
         let moment = at.filter(|&(take, _)| usable(take));
         let moment = moment.map(|(take, time)| {
             let anim = &self.scene.anim_stacks[take].anim;
             (anim, (time * ticks).round() / ticks)
         });
-        let mut worlds: Vec<World> = Vec::with_capacity(self.nodes.len());
-        for (node, &id) in self.nodes.iter().zip(&self.ids) {
+        let mut worlds: Vec<World> = Vec::with_capacity(self.ids.len());
+        for (node, &id) in self.contents.nodes.iter().zip(&self.ids) {
             let theirs = &self.scene.nodes[id];
             let local = match moment {
                 Some((anim, time)) => local(&ufbx::evaluate_transform(anim, theirs, time)),
@@ -316,42 +315,5 @@ impl UfbxScene {
             worlds.push(parent.below(&local, inherit(theirs)));
         }
         worlds.iter().map(World::matrix).collect()
-    }
-}
-
-impl Scene for UfbxScene {
-    fn format(&self) -> &'static str {
-        "fbx"
-    }
-
-    fn nodes(&self) -> &[Node] {
-        &self.nodes
-    }
-
-    fn takes(&self) -> &[Take] {
-        &self.takes
-    }
-
-    fn up_axis(&self) -> &str {
-        &self.settings.up_axis
-    }
-
-    fn unit_m(&self) -> f64 {
-        self.settings.unit_m
-    }
-
-    fn canonical_from_file(&self) -> Matrix3<f64> {
-        self.settings.canonical_from_file
-    }
-
-    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        match (at, &self.bound) {
-            (None, Some(bound)) => bound.clone(),
-            _ => self.placed(at),
-        }
-    }
-
-    fn problems(&self) -> &[Problem] {
-        &self.problems
     }
 }

@@ -126,7 +126,7 @@ fn bones_rest_in_their_bind_pose() {
         compared += 1;
     }
     assert!(compared > 15, "{compared}");
-    assert_eq!(scene.problems()[0].id, "rest-from-bind-pose");
+    assert_eq!(scene.contents().problems[0].id, "rest-from-bind-pose");
 }
 
 /// These were bound with other joint axes, a quarter turn about the up axis from where their joints stand.

@@ -46,7 +46,7 @@ impl<'a> Document<'a> {
             let reason = "a record's end marker isn't where the record ends";
             broken(tape.place(), reason)
         })?;
-        let budget = bytes.len().saturating_mul(16).saturating_add(16 << 20);
+        let budget = bytes.len().saturating_mul(6).saturating_add(3 << 20);
         Ok(Self { records, budget })
     }
 

@@ -188,7 +188,8 @@ fn circles_are_cut() {
     assert_eq!(scene.nodes().len(), 1);
     assert!(
         scene
-            .problems()
+            .contents()
+            .problems
             .iter()
             .any(|problem| problem.id == "circular-nodes")
     );

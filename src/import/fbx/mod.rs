@@ -33,12 +33,12 @@ mod synthetic;
 
 use crate::clip::{Problem, Severity};
 use crate::import::bind::{Binds, Stand, pose};
-use crate::import::scene::{Node, Scene, Take};
+use crate::import::scene::{Contents, Node, Scene, Take};
 use curve::Curve;
 use document::Document;
 pub(crate) use document::is_ascii;
 use layers::{Animation, Curves};
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::Matrix4;
 use nodes::{Rig, Tree};
 use objects::Graph;
 use properties::Templates;
@@ -84,16 +84,13 @@ fn in_range(value: f64) -> bool {
 
 /// A parsed FBX file.
 pub(crate) struct FbxScene {
-    nodes: Vec<Node>,
+    contents: Contents,
     rigs: Vec<Rig>,
-    takes: Vec<Take>,
     /// One per take.
     animations: Vec<Animation>,
     curves: Vec<Curve>,
-    /// World matrices at rest, where that isn't how the nodes stand.
-    bound: Option<Vec<Matrix4<f64>>>,
-    settings: Settings,
-    problems: Vec<Problem>,
+    /// Ticks per second.
+    ticks: f64,
 }
 
 /// Parses an FBX file of any kind that this build can read.
@@ -115,8 +112,7 @@ fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     let graph = Graph::read(&document);
     let tree = Tree::read(&graph, &templates);
     let mut curves = Curves::new(settings.ticks, document.budget, graph.links());
-    let mut problems = settings.problems.clone();
-    problems.extend(graph_problems(&graph, &tree));
+    let problems = graph_problems(&graph, &tree);
     let spans = takes::spans(&document);
     let (mut takes, mut animations) = (Vec::new(), Vec::new());
     for stack in graph.of_class("AnimationStack") {
@@ -141,71 +137,48 @@ fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     let binds = bind::binds(&graph, &tree, document.budget);
     let Tree { nodes, rigs, .. } = tree;
     let mut scene = FbxScene {
-        nodes,
+        ticks: settings.ticks,
+        contents: contents(settings, nodes, takes, problems),
         rigs,
-        takes,
         animations,
         curves,
-        bound: None,
-        settings,
-        problems,
     };
-    scene.rest_in(binds);
+    if let Some((world, problem)) = bound(&scene, binds) {
+        scene.contents.bound = Some(world);
+        scene.contents.problems.push(problem);
+    }
     Ok(scene)
 }
 
-impl FbxScene {
-    /// Takes a bind pose as the rest pose, where the nodes stand in another. A root keeps its heading: bind poses are
-    /// often kept in the axes of the tool that the character was modelled in.
-    fn rest_in(&mut self, binds: Vec<Binds>) {
-        if binds.is_empty() {
-            return;
-        }
-        let placed = self.placed(None);
-        if let Some((world, problem)) = bound(&self.nodes, &placed, &self.settings, binds) {
-            self.bound = Some(world);
-            self.problems.push(problem);
-        }
-    }
-
-    /// World matrices of all nodes at `at`, or as they stand in the file.
-    ///
-    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
-    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        let moment = at.and_then(|(take, time)| {
-            let animation = self.animations.get(take)?;
-            let tick = (time * self.settings.ticks).round();
-            Some((animation, tick, animation.weights(&self.curves, tick)))
-        });
-        let mut worlds: Vec<World> = Vec::with_capacity(self.nodes.len());
-        for (index, (node, rig)) in self.nodes.iter().zip(&self.rigs).enumerate() {
-            let pose = match &moment {
-                Some((animation, tick, weights)) => {
-                    animation.pose(index, rig, &self.curves, weights, *tick)
-                }
-                None => rig.rest,
-            };
-            let parent = node
-                .parent
-                .and_then(|parent| worlds.get(parent).copied())
-                .unwrap_or_else(World::root);
-            worlds.push(parent.child(&pose, &rig.rules));
-        }
-        worlds.iter().map(World::matrix).collect()
+/// What a file of these settings holds.
+fn contents(
+    settings: Settings,
+    nodes: Vec<Node>,
+    takes: Vec<Take>,
+    more_problems: Vec<Problem>,
+) -> Contents {
+    let mut problems = settings.problems;
+    problems.extend(more_problems);
+    Contents {
+        up_axis: settings.up_axis,
+        unit_m: settings.unit_m,
+        canonical_from_file: settings.canonical_from_file,
+        problems,
+        ..Contents::new("fbx", nodes, takes)
     }
 }
 
-/// World matrices in the bind pose of nodes that are `placed` in another, and a note.
-fn bound(
-    nodes: &[Node],
-    placed: &[Matrix4<f64>],
-    settings: &Settings,
-    binds: Vec<Binds>,
-) -> Option<(Vec<Matrix4<f64>>, Problem)> {
+/// Takes a bind pose as the rest pose of a scene whose nodes stand in another. A root keeps its heading: bind poses are
+/// often kept in the axes of the tool that the character was modelled in.
+fn bound<S: Scene>(scene: &S, binds: Vec<Binds>) -> Option<(Vec<Matrix4<f64>>, Problem)> {
+    if binds.is_empty() {
+        return None;
+    }
+    let contents = scene.contents();
     let stand = Stand {
-        nodes,
-        world: placed,
-        up: Some(settings.canonical_from_file.row(2).transpose()),
+        nodes: &contents.nodes,
+        world: &scene.placed(None),
+        up: Some(contents.canonical_from_file.row(2).transpose()),
     };
     pose(&stand, binds.into_iter())
 }
@@ -238,38 +211,31 @@ fn constraints_left_out() -> Problem {
 }
 
 impl Scene for FbxScene {
-    fn format(&self) -> &'static str {
-        "fbx"
+    fn contents(&self) -> &Contents {
+        &self.contents
     }
 
-    fn nodes(&self) -> &[Node] {
-        &self.nodes
-    }
-
-    fn takes(&self) -> &[Take] {
-        &self.takes
-    }
-
-    fn up_axis(&self) -> &str {
-        &self.settings.up_axis
-    }
-
-    fn unit_m(&self) -> f64 {
-        self.settings.unit_m
-    }
-
-    fn canonical_from_file(&self) -> Matrix3<f64> {
-        self.settings.canonical_from_file
-    }
-
-    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        match (at, &self.bound) {
-            (None, Some(bound)) => bound.clone(),
-            _ => self.placed(at),
+    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let moment = at.and_then(|(take, time)| {
+            let animation = self.animations.get(take)?;
+            let tick = (time * self.ticks).round();
+            Some((animation, tick, animation.weights(&self.curves, tick)))
+        });
+        let mut worlds: Vec<World> = Vec::with_capacity(self.contents.nodes.len());
+        for (index, (node, rig)) in self.contents.nodes.iter().zip(&self.rigs).enumerate() {
+            let pose = match &moment {
+                Some((animation, tick, weights)) => {
+                    animation.pose(index, rig, &self.curves, weights, *tick)
+                }
+                None => rig.rest,
+            };
+            let parent = node
+                .parent
+                .and_then(|parent| worlds.get(parent).copied())
+                .unwrap_or_else(World::root);
+            worlds.push(parent.child(&pose, &rig.rules));
         }
-    }
-
-    fn problems(&self) -> &[Problem] {
-        &self.problems
+        worlds.iter().map(World::matrix).collect()
     }
 }

@@ -112,6 +112,7 @@ fn node(graph: &Graph, object: usize, parent: Option<usize>) -> Node {
         parent,
         is_bone: has(&BONES),
         is_plain: !has(&SOLID) && graph.children(object, "Geometry").next().is_none(),
+        bone: None,
     }
 }
 

@@ -65,9 +65,11 @@ impl<'a> Buffers<'a> {
                 .map(Cow::Borrowed)
                 .ok_or("it has no bytes; export the file again".to_owned()),
             None => Err("it has no address; export the file again".to_owned()),
-            Some(uri) => match uri.strip_prefix("data:") {
-                Some(data) => data_uri(data).map(Cow::Owned),
-                None => self.read_beside(uri).map(Cow::Owned),
+            Some(uri) => match uri.split_once(':') {
+                Some((scheme, data)) if scheme.eq_ignore_ascii_case("data") => {
+                    data_uri(data).map(Cow::Owned)
+                }
+                _ => self.read_beside(uri).map(Cow::Owned),
             },
         }
     }
@@ -104,15 +106,16 @@ impl<'a> Buffers<'a> {
 /// The path of `uri` in `folder`, unless it leads out of it, by its words or by a link.
 fn inside(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     let outside = || format!("`{uri}` lies outside the file's folder; put it beside the file");
-    let name = percent_decoded(uri);
+    let (name, _) = percent_decoded(uri);
+    let name = String::from_utf8_lossy(&name);
     let plain = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
-    if name.contains([':', '\\', '\0']) || !Path::new(&name).components().all(plain) {
+    if name.contains([':', '\\', '\0']) || !Path::new(&*name).components().all(plain) {
         return Err(outside());
     }
     let missing =
         |e: std::io::Error| format!("`{uri}` can't be read ({e}); put it beside the file");
     let folder = folder.canonicalize().map_err(missing)?;
-    let path = folder.join(name).canonicalize().map_err(missing)?;
+    let path = folder.join(&*name).canonicalize().map_err(missing)?;
     if path.starts_with(&folder) {
         Ok(path)
     } else {
@@ -120,33 +123,52 @@ fn inside(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     }
 }
 
-fn percent_decoded(uri: &str) -> String {
-    let mut bytes = Vec::with_capacity(uri.len());
-    let mut rest = uri.as_bytes();
+/// The bytes that a part of a URI stands for (RFC 3986 §2.1), and whether every `%` began the code of one.
+fn percent_decoded(text: &str) -> (Vec<u8>, bool) {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    let mut whole = true;
+    let digit = |byte: u8| Some(char::from(byte).to_digit(16)? as u8);
     while let Some((&first, tail)) = rest.split_first() {
-        let code = tail.get(..2).and_then(|hex| std::str::from_utf8(hex).ok());
-        let code = code
-            .filter(|_| first == b'%')
-            .and_then(|hex| u8::from_str_radix(hex, 16).ok());
-        bytes.push(code.unwrap_or(first));
-        rest = if code.is_some() {
-            tail.get(2..).unwrap_or_default()
-        } else {
-            tail
+        rest = tail;
+        let code = match tail {
+            [high, low, ..] if first == b'%' => digit(*high).zip(digit(*low)),
+            _ => None,
         };
+        match code {
+            Some((high, low)) => {
+                bytes.push(high << 4 | low);
+                rest = &tail[2..];
+            }
+            None => {
+                whole &= first != b'%';
+                bytes.push(first);
+            }
+        }
     }
-    String::from_utf8_lossy(&bytes).into_owned()
+    (bytes, whole)
 }
 
-/// The bytes of a data URI, given what follows `data:`.
+/// The bytes of a data URI (RFC 2397), given what follows `data:`.
 fn data_uri(data: &str) -> Result<Vec<u8>, String> {
+    const BASE64: &str = ";base64";
+    let broken = |reason: &str| format!("its data URI {reason}; export the file again");
     let (kind, body) = data
         .split_once(',')
-        .ok_or("its data URI has no data; export the file again")?;
-    if !kind.ends_with(";base64") {
-        return Err("its data URI isn't base64; export the file again".to_owned());
+        .ok_or_else(|| broken("has no comma, and so no data"))?;
+    let (bytes, whole) = percent_decoded(body);
+    if !whole {
+        return Err(broken("has a `%` without two hexadecimal digits after it"));
     }
-    base64(body.as_bytes()).ok_or_else(|| "its base64 is broken; export the file again".to_owned())
+    let start = kind.len().saturating_sub(BASE64.len());
+    let end = kind.get(start..).unwrap_or_default();
+    if end.eq_ignore_ascii_case(BASE64) {
+        return base64(&bytes).ok_or_else(|| broken("has broken base64"));
+    }
+    match body.is_ascii() {
+        true => Ok(bytes),
+        false => Err(broken("has a character that must be written with `%`")),
+    }
 }
 
 /// Decodes base64 (RFC 4648), with or without padding, in either alphabet.
@@ -205,6 +227,31 @@ mod tests {
         }
         assert_eq!(base64(b"Zm9v!"), None);
         assert_eq!(base64(b"Zm9vY"), None);
+    }
+
+    #[test]
+    fn data_uris_hold_base64_or_percent_codes() {
+        let bytes = |data: &str| data_uri(data).unwrap_or_else(|e| panic!("{data}: {e}"));
+        assert_eq!(bytes(",A%20brief%20note"), b"A brief note");
+        assert_eq!(bytes("application/octet-stream,%00%fF+a"), b"\0\xff+a");
+        assert_eq!(bytes(";BASE64,Zm9v"), b"foo");
+        assert_eq!(bytes("text/plain;base64,Zg%3D%3d"), b"f");
+        assert_eq!(bytes(","), b"");
+        for (data, reason) in [
+            ("AAAA", "no comma"),
+            (",%0", "without two"),
+            (",%+1", "without two"),
+            (",%", "without two"),
+            (";base64,%4", "without two"),
+            (";base64,!", "broken base64"),
+            (",ä", "must be written"),
+        ] {
+            let found = data_uri(data).expect_err(data);
+            assert!(
+                found.contains(reason) && found.contains("export"),
+                "{data}: {found}"
+            );
+        }
     }
 
     #[test]

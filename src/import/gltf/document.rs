@@ -16,17 +16,17 @@ use std::marker::PhantomData;
 #[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document {
-    #[serde(deserialize_with = "bounded")]
+    #[serde(deserialize_with = "bounded::<_, _, MOST_NODES>")]
     pub nodes: Vec<Node>,
-    #[serde(deserialize_with = "bounded")]
+    #[serde(deserialize_with = "bounded::<_, _, MOST_ENTRIES>")]
     pub skins: Vec<Skin>,
-    #[serde(deserialize_with = "bounded")]
+    #[serde(deserialize_with = "bounded::<_, _, MOST_ENTRIES>")]
     pub animations: Vec<Animation>,
-    #[serde(deserialize_with = "bounded")]
+    #[serde(deserialize_with = "bounded::<_, _, MOST_ENTRIES>")]
     pub accessors: Vec<Accessor>,
-    #[serde(deserialize_with = "bounded")]
+    #[serde(deserialize_with = "bounded::<_, _, MOST_ENTRIES>")]
     pub buffer_views: Vec<buffer::View>,
-    #[serde(deserialize_with = "bounded")]
+    #[serde(deserialize_with = "bounded::<_, _, MOST_ENTRIES>")]
     pub buffers: Vec<Buffer>,
     pub extensions_required: Vec<String>,
     #[serde(skip)]
@@ -36,27 +36,32 @@ pub(super) struct Document {
     pub extensions: Option<Extensions>,
 }
 
-/// Most entries of a list. Three bytes of JSON can make one, which takes hundreds of bytes here.
+/// Most nodes, and most entries of other lists. Three bytes of JSON can make one, which takes hundreds of bytes here.
+const MOST_NODES: usize = 1 << 15;
 const MOST_ENTRIES: usize = 1 << 17;
 
-/// A list of at most [`MOST_ENTRIES`].
-fn bounded<'de, D: Deserializer<'de>, T: Deserialize<'de>>(list: D) -> Result<Vec<T>, D::Error> {
-    list.deserialize_seq(Bounded(PhantomData))
+/// A list of at most `MOST` entries.
+fn bounded<'de, D, T, const MOST: usize>(list: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de>,
+{
+    list.deserialize_seq(Bounded::<T, MOST>(PhantomData))
 }
 
-struct Bounded<T>(PhantomData<T>);
+struct Bounded<T, const MOST: usize>(PhantomData<T>);
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Bounded<T> {
+impl<'de, T: Deserialize<'de>, const MOST: usize> Visitor<'de> for Bounded<T, MOST> {
     type Value = Vec<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a list of at most {MOST_ENTRIES} entries")
+        write!(f, "a list of at most {MOST} entries")
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<Vec<T>, A::Error> {
         let mut list = Vec::new();
         while let Some(entry) = entries.next_element()? {
-            if list.len() == MOST_ENTRIES {
+            if list.len() == MOST {
                 return Err(A::Error::invalid_length(list.len() + 1, &self));
             }
             list.push(entry);
@@ -171,24 +176,35 @@ impl Default for HumanBones {
     }
 }
 
+impl HumanBones {
+    fn named(&self) -> Vec<(i64, &str)> {
+        match self {
+            Self::List(bones) => bones.iter().map(|b| (b.node, b.bone.as_str())).collect(),
+            Self::Named(bones) => bones
+                .iter()
+                .map(|(name, b)| (b.node, name.as_str()))
+                .collect(),
+        }
+    }
+}
+
 #[derive(Deserialize)]
 struct HumanBone {
+    /// Its name, in lists.
+    #[serde(default)]
+    bone: String,
     /// −1 where the humanoid lacks the bone.
     node: i64,
 }
 
 impl Extensions {
-    /// Nodes that are bones of a VRM humanoid; the file may lack them.
-    pub fn bones(&self) -> Vec<usize> {
+    /// Nodes that are bones of a VRM humanoid, and which; the file may lack them.
+    pub fn bones(&self) -> impl Iterator<Item = (usize, &str)> {
         let all = [&self.vrm_0, &self.vrm_1, &self.vrm_animation];
-        let nodes = |vrm: &&Vrm| match &vrm.humanoid.human_bones {
-            HumanBones::List(bones) => bones.iter().map(|bone| bone.node).collect::<Vec<_>>(),
-            HumanBones::Named(bones) => bones.values().map(|bone| bone.node).collect(),
-        };
-        let nodes = all.iter().flat_map(nodes);
-        nodes
-            .filter_map(|node| usize::try_from(node).ok())
-            .collect()
+        let bones = all
+            .into_iter()
+            .flat_map(|vrm| vrm.humanoid.human_bones.named());
+        bones.filter_map(|(node, bone)| Some((usize::try_from(node).ok()?, bone)))
     }
 }
 
@@ -306,12 +322,12 @@ mod tests {
                 vec!["{}"; count].join(",")
             )
         };
-        assert!(parse(nodes(MOST_ENTRIES).as_bytes()).is_ok());
-        let error = parse(nodes(MOST_ENTRIES + 1).as_bytes())
+        assert!(parse(nodes(MOST_NODES).as_bytes()).is_ok());
+        let error = parse(nodes(MOST_NODES + 1).as_bytes())
             .map(|_| ())
             .expect_err("too many");
         assert!(
-            error.to_string().contains("at most 131072 entries"),
+            error.to_string().contains("at most 32768 entries"),
             "{error}"
         );
     }

@@ -13,17 +13,16 @@ mod tree;
 
 pub use error::GltfError;
 
-use super::scene::{Node, Scene, Take};
+use super::scene::{Contents, Scene, composed};
 use crate::clip::{Problem, Severity};
-use crate::import::axes::UpAxis;
 use crate::import::bind::{Stand, pose};
 use accessor::Accessors;
 use buffer::Buffers;
 use document::Document;
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::Matrix4;
 use std::path::Path;
 use take::Curves;
-use tree::Tree;
+use tree::{Rest, Tree};
 
 /// Required extensions that change neither the nodes nor their motion.
 const HARMLESS: [&str; 4] = [
@@ -35,13 +34,11 @@ const HARMLESS: [&str; 4] = [
 
 /// A glTF file's nodes and animations.
 pub(crate) struct GltfScene {
-    tree: Tree,
-    /// World matrices at rest, where that isn't how the nodes stand.
-    bound: Option<Vec<Matrix4<f64>>>,
-    takes: Vec<Take>,
+    contents: Contents,
+    /// How the nodes stand in their parents.
+    rest: Vec<Rest>,
+    /// One per take.
     curves: Vec<Curves>,
-    problems: Vec<Problem>,
-    bytes_beside: usize,
 }
 
 /// Reads a GLB file.
@@ -83,13 +80,17 @@ fn scene(
         problems.push(problem);
         world
     });
-    Ok(GltfScene {
-        bytes_beside: accessors.bytes_beside(),
+    let Tree { nodes, rest, .. } = tree;
+    let contents = Contents {
         bound,
-        tree,
-        takes,
-        curves,
         problems,
+        bytes_beside: accessors.bytes_beside(),
+        ..Contents::new("gltf", nodes, takes)
+    };
+    Ok(GltfScene {
+        contents,
+        rest,
+        curves,
     })
 }
 
@@ -116,50 +117,20 @@ fn extension_problems(document: &Document) -> Vec<Problem> {
 }
 
 impl Scene for GltfScene {
-    fn format(&self) -> &'static str {
-        "gltf"
+    fn contents(&self) -> &Contents {
+        &self.contents
     }
 
-    fn nodes(&self) -> &[Node] {
-        &self.tree.nodes
-    }
-
-    fn takes(&self) -> &[Take] {
-        &self.takes
-    }
-
-    fn up_axis(&self) -> &str {
-        "+Y"
-    }
-
-    fn unit_m(&self) -> f64 {
-        1.0
-    }
-
-    fn canonical_from_file(&self) -> Matrix3<f64> {
-        UpAxis::PlusY.canonical_from_file()
-    }
-
-    fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
-        let Some((curves, time)) = at.and_then(|(take, time)| Some((self.curves.get(take)?, time)))
-        else {
-            let stand = || self.tree.rest_world();
-            return self.bound.clone().unwrap_or_else(stand);
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let moment = at.and_then(|(take, time)| Some((self.curves.get(take)?, time)));
+        let local = |(at, rest): (usize, &Rest)| {
+            let moved =
+                moment.and_then(|(curves, time)| curves.placement(at, &rest.placement, time));
+            moved.map_or_else(|| rest.matrix(), |placement| placement.matrix())
         };
-        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(self.tree.nodes.len());
-        for (at, (node, rest)) in self.tree.nodes.iter().zip(&self.tree.rest).enumerate() {
-            let placement = curves.placement(at, &rest.placement, time);
-            let local = placement.map_or_else(|| rest.matrix(), |placement| placement.matrix());
-            world.push(node.parent.map_or(local, |parent| world[parent] * local));
-        }
-        world
-    }
-
-    fn problems(&self) -> &[Problem] {
-        &self.problems
-    }
-
-    fn bytes_beside(&self) -> usize {
-        self.bytes_beside
+        composed(
+            &self.contents.nodes,
+            self.rest.iter().enumerate().map(local),
+        )
     }
 }

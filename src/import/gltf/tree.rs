@@ -7,6 +7,7 @@ use crate::import::rigid::rotation_of;
 use crate::import::scene;
 use gltf::json::{Index, Node};
 use nalgebra::{Matrix4, Rotation3, UnitQuaternion, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Translation, rotation and scale of a node in its parent.
 #[derive(Clone, Copy)]
@@ -34,12 +35,7 @@ pub(super) struct Tree {
 impl Tree {
     /// World matrices of all nodes by their own transforms.
     pub fn rest_world(&self) -> Vec<Matrix4<f64>> {
-        let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(self.nodes.len());
-        for (node, rest) in self.nodes.iter().zip(&self.rest) {
-            let local = rest.matrix();
-            world.push(node.parent.map_or(local, |parent| world[parent] * local));
-        }
-        world
+        scene::composed(&self.nodes, self.rest.iter().map(Rest::matrix))
     }
 }
 
@@ -108,11 +104,8 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
         let mark = bone.get_mut(node).ok_or_else(|| missing(node))?;
         *mark = true;
     }
-    for node in document.extensions.iter().flat_map(Extensions::bones) {
-        if let Some(mark) = bone.get_mut(node) {
-            *mark = true;
-        }
-    }
+    let told = told(document);
+    let bone_of = |node| told.get(&node).copied().filter(|bone| !bone.is_empty());
     let about = |&node: &usize| {
         let source = &document.nodes[node];
         let holds = source.mesh.is_some() || source.camera.is_some() || document.is_light(node);
@@ -122,8 +115,9 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
                 .clone()
                 .unwrap_or_else(|| format!("node {node}")),
             parent: parents[node].map(|parent| place[parent]),
-            is_bone: bone[node],
+            is_bone: bone[node] || told.contains_key(&node),
             is_plain: !holds,
+            bone: bone_of(node).map(str::to_owned),
         }
     };
     let nodes = order.iter().map(about).collect();
@@ -132,6 +126,18 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
         .map(|&node| Rest::new(&document.nodes[node]))
         .collect();
     Ok(Tree { nodes, rest, place })
+}
+
+/// Nodes that an extension says to be bones, and which, each once; nothing where it doesn't say which.
+fn told(document: &Document) -> BTreeMap<usize, &str> {
+    let (mut told, mut names) = (BTreeMap::new(), BTreeSet::new());
+    let bones = document.extensions.iter().flat_map(Extensions::bones);
+    for (node, bone) in bones {
+        if !told.contains_key(&node) && (bone.is_empty() || names.insert(bone)) {
+            told.insert(node, bone);
+        }
+    }
+    told
 }
 
 fn missing(node: usize) -> GltfError {

@@ -120,6 +120,7 @@ fn rig(skeleton: &Skeleton, rest: &[f64], frames: &[Vec<f64>], size: f64, down: 
             name: name(b).unwrap_or("Other").to_owned(),
             parent: skeleton.bodies[b].parent,
             rest,
+            bone: None,
         });
     Clip {
         name: "rig".to_owned(),

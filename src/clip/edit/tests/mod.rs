@@ -34,6 +34,7 @@ fn joint(name: &str, parent: Option<usize>, rest: Isometry3<f64>) -> Joint {
         name: name.to_owned(),
         parent,
         rest,
+        bone: None,
     }
 }
 

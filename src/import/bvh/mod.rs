@@ -1,0 +1,212 @@
+//! BVH (Biovision hierarchy): a text with a tree of joints, their offsets and channels, and a row of numbers per frame.
+//!
+//! There is no standard, so this reads what programs write: channels in any order and on any joint, several roots,
+//! joints without an end site, any line ends and letter case, and rows that disagree with the header's count.
+
+mod hierarchy;
+mod words;
+
+use super::measure::{Scale, rate_of_frame_time};
+use super::scene::{Contents, Node, Scene, Take, composed};
+use crate::clip::{Problem, Severity, slerp};
+use hierarchy::{Channel, Joint, MOST_JOINTS, hierarchy};
+use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
+use words::Words;
+
+/// Rate of a file whose frame time can't be used, Hz.
+const USUAL_RATE: f64 = 30.0;
+
+/// Why a BVH file couldn't be read.
+#[derive(Debug, thiserror::Error)]
+pub enum BvhError {
+    #[error("line {line}: {what} is missing; write the file again")]
+    Missing { line: usize, what: &'static str },
+    #[error("line {line}: `{found}` where {expected} should be; repair that line")]
+    Unexpected {
+        line: usize,
+        found: String,
+        expected: &'static str,
+    },
+    #[error(
+        "line {line}: `{found}` is no channel; there are Xposition to Zposition and Xrotation to Zrotation"
+    )]
+    Channel { line: usize, found: String },
+    #[error("line {line}: more than {MOST_JOINTS} joints; split the file")]
+    TooMany { line: usize },
+    #[error("the hierarchy has no channels, so nothing can move; write the file again")]
+    NoChannels,
+    #[error("no frames follow the hierarchy; write the file again")]
+    NoFrames,
+}
+
+/// A BVH file.
+pub(crate) struct BvhScene {
+    contents: Contents,
+    joints: Vec<Joint>,
+    /// Numbers of all frames, one frame after the other.
+    numbers: Vec<f64>,
+    width: usize,
+    rate: f64,
+}
+
+/// Reads a file. `name` becomes the take's name, since the format has none.
+pub(crate) fn read(bytes: &[u8], name: &str) -> Result<BvhScene, BvhError> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut words = Words::new(&text);
+    let joints = hierarchy(&mut words)?;
+    let width: usize = joints.iter().map(|joint| joint.channels.len()).sum();
+    if width == 0 {
+        return Err(BvhError::NoChannels);
+    }
+    let mut problems = Vec::new();
+    let (count, rate) = header(&mut words, &mut problems)?;
+    let numbers = numbers(&mut words, width, &mut problems)?;
+    let frames = numbers.len() / width;
+    problems.extend(other_count(count, frames));
+    let scale = Scale::guess(&rest(&joints));
+    problems.extend(scale.problem());
+    let take = Take {
+        end: (frames - 1) as f64 / rate,
+        fps: rate,
+        animated: (0..joints.len())
+            .filter(|&j| !joints[j].channels.is_empty())
+            .collect(),
+        channels: joints.len(),
+        ..Take::still(name.to_owned())
+    };
+    let nodes = joints
+        .iter()
+        .map(|joint| Node::bone(joint.name.clone(), joint.parent));
+    Ok(BvhScene {
+        contents: Contents {
+            unit_m: scale.unit_m,
+            problems,
+            ..Contents::new("bvh", nodes.collect(), vec![take])
+        },
+        joints,
+        numbers,
+        width,
+        rate,
+    })
+}
+
+/// Count of frames and frames per second, as the header has them.
+fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(f64, f64), BvhError> {
+    words.keyword("Frames:")?;
+    let count = words.number("a number of frames")?;
+    words.keyword("Frame")?;
+    words.keyword("Time:")?;
+    let word = words.expect("a frame time")?;
+    let seconds = words.parsed(word, "a frame time")?;
+    let rate = rate_of_frame_time(word, seconds).unwrap_or_else(|| {
+        problems.push(Problem {
+            id: "frame-time".to_owned(),
+            severity: Severity::Warning,
+            message: format!(
+                "a frame time of `{word}` can't be used; {USUAL_RATE} frames per second are assumed, write the right time into the file"
+            ),
+        });
+        USUAL_RATE
+    });
+    Ok((count, rate))
+}
+
+/// Numbers of whole frames.
+fn numbers(
+    words: &mut Words,
+    width: usize,
+    problems: &mut Vec<Problem>,
+) -> Result<Vec<f64>, BvhError> {
+    let mut numbers = Vec::new();
+    while let Some(word) = words.next() {
+        numbers.push(words.parsed(word, "a number")?);
+    }
+    let over = numbers.len() % width;
+    if over > 0 {
+        problems.push(Problem {
+            id: "frame-cut".to_owned(),
+            severity: Severity::Warning,
+            message: format!(
+                "the last frame has {over} of {width} numbers and is left out; the file may be cut"
+            ),
+        });
+    }
+    numbers.truncate(numbers.len() - over);
+    match numbers.is_empty() {
+        true => Err(BvhError::NoFrames),
+        false => Ok(numbers),
+    }
+}
+
+fn other_count(stated: f64, found: usize) -> Option<Problem> {
+    (stated != found as f64).then(|| Problem {
+        id: "frame-count".to_owned(),
+        severity: Severity::Note,
+        message: format!("the header counts {stated} frames, and {found} follow: those are read"),
+    })
+}
+
+/// World places of the joints without any rotation.
+fn rest(joints: &[Joint]) -> Vec<Vector3<f64>> {
+    let mut places: Vec<Vector3<f64>> = Vec::with_capacity(joints.len());
+    for joint in joints {
+        let parent = joint.parent.map_or_else(Vector3::zeros, |p| places[p]);
+        places.push(parent + joint.offset);
+    }
+    places
+}
+
+impl BvhScene {
+    /// Transform of a joint in its parent at a frame. A position channel replaces the offset along its axis, as the
+    /// files with channels of both kinds on every joint mean it.
+    fn local(&self, joint: &Joint, frame: usize) -> Isometry3<f64> {
+        let numbers = &self.numbers[frame * self.width + joint.first..];
+        let mut place = joint.offset;
+        let mut turn = UnitQuaternion::identity();
+        for (channel, number) in joint.channels.iter().zip(numbers) {
+            match *channel {
+                Channel::Position(axis) => place[axis] = *number,
+                Channel::Rotation(axis) => {
+                    let axis = Vector3::ith_axis(axis);
+                    turn *= UnitQuaternion::from_axis_angle(&axis, number.to_radians());
+                }
+            }
+        }
+        Isometry3::from_parts(Translation3::from(place), turn)
+    }
+
+    /// The same between frames.
+    fn local_at(&self, joint: &Joint, position: f64) -> Isometry3<f64> {
+        let last = self.numbers.len() / self.width - 1;
+        let frame = (position as usize).min(last);
+        let a = self.local(joint, frame);
+        let blend = position - frame as f64;
+        if blend <= 1e-9 || frame == last {
+            return a;
+        }
+        let b = self.local(joint, frame + 1);
+        let place = a.translation.vector.lerp(&b.translation.vector, blend);
+        Isometry3::from_parts(
+            Translation3::from(place),
+            slerp(&a.rotation, &b.rotation, blend),
+        )
+    }
+}
+
+impl Scene for BvhScene {
+    fn contents(&self) -> &Contents {
+        &self.contents
+    }
+
+    fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
+        let local = |joint: &Joint| match at {
+            Some((_, time)) => self.local_at(joint, (time * self.rate).max(0.0)),
+            None => Isometry3::from_parts(joint.offset.into(), UnitQuaternion::identity()),
+        };
+        let locals = self
+            .joints
+            .iter()
+            .map(|joint| local(joint).to_homogeneous());
+        composed(&self.contents.nodes, locals)
+    }
+}

@@ -1,0 +1,274 @@
+//! Damaged copies of real files: reading them never panics, ends soon, and takes no more memory than their size allows.
+//!
+//! `MIMIC_FUZZ_INPUTS`, `MIMIC_FUZZ_SEED` and `MIMIC_FUZZ_FIRST` say how many copies, of which seed, and from which number
+//! on `many_inputs` reads; those that fail are kept in `MIMIC_FUZZ_FOLDER`.
+
+mod fbx;
+mod glb;
+mod heap;
+mod json;
+mod plain;
+mod random;
+mod seeds;
+mod text;
+
+use mimic::import::{self, Options};
+use random::Random;
+use seeds::Seed;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// Bytes that reading may take for each byte that is read, and for any file: a few bytes can ask for many frames, and
+/// tables of a reader have their size whatever is in the file.
+const PER_BYTE: usize = 64;
+const FREE: usize = 32 << 20;
+const SOON: Duration = Duration::from_secs(1);
+/// What takes this long doesn't end.
+const NEVER: u64 = 120;
+/// Failures after which there is no use in going on.
+const ENOUGH: usize = 100;
+
+/// What was seen of one format.
+#[derive(Default)]
+struct Tally {
+    inputs: u64,
+    read: u64,
+    longest: Duration,
+    /// Most bytes in use at once, and most of them beyond [`PER_BYTE`].
+    peak: usize,
+    excess: usize,
+}
+
+/// A fuzzing run.
+struct Run {
+    seeds: Vec<Seed>,
+    kinds: Vec<&'static str>,
+    seed: u64,
+    /// A motion by way of which skeletons are read.
+    motion: Vec<u8>,
+    /// For files that have to lie on a disk.
+    folder: tempfile::TempDir,
+    kept: PathBuf,
+    tallies: BTreeMap<&'static str, Tally>,
+    failures: usize,
+}
+
+/// The input being read, and when that began, in seconds since the start.
+static CURRENT: AtomicU64 = AtomicU64::new(0);
+static BEGAN: AtomicU64 = AtomicU64::new(0);
+
+/// Ends the program when one input takes too long.
+fn watch(start: Instant) {
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(Duration::from_secs(5));
+            if start.elapsed().as_secs() > BEGAN.load(Relaxed) + NEVER {
+                eprintln!("input {} doesn't end", CURRENT.load(Relaxed));
+                std::process::exit(1);
+            }
+        }
+    });
+}
+
+impl Run {
+    fn new(seed: u64, kept: PathBuf) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let seeds = seeds::all();
+        let bytes = |kind: &str| {
+            seeds
+                .iter()
+                .find(|s| s.kind == kind)
+                .map(|s| s.bytes.clone())
+        };
+        if let Some(skeleton) = bytes("ASF") {
+            std::fs::write(folder.path().join("01.asf"), skeleton).expect("it is written");
+        }
+        let motion = bytes("AMC").unwrap_or_default();
+        let mut kinds: Vec<_> = seeds.iter().map(|s| s.kind).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        Self {
+            tallies: kinds.iter().map(|kind| (*kind, Tally::default())).collect(),
+            seeds,
+            kinds,
+            seed,
+            motion,
+            folder,
+            kept,
+            failures: 0,
+        }
+    }
+
+    fn inputs(&mut self, numbers: std::ops::Range<u64>) {
+        let start = Instant::now();
+        watch(start);
+        for input in numbers {
+            CURRENT.store(input, Relaxed);
+            BEGAN.store(start.elapsed().as_secs(), Relaxed);
+            self.input(input);
+            if (input + 1).is_multiple_of(20_000) {
+                eprintln!("{} inputs, {:.0?}", input + 1, start.elapsed());
+            }
+            if self.failures >= ENOUGH {
+                break;
+            }
+        }
+        BEGAN.store(u64::MAX - NEVER, Relaxed);
+    }
+
+    fn input(&mut self, input: u64) {
+        let mut random = Random::new(self.seed, input);
+        let kind = *random.of(&self.kinds);
+        let of_kind: Vec<&Seed> = self.seeds.iter().filter(|s| s.kind == kind).collect();
+        let seed = *random.of(&of_kind);
+        let bytes = seed.damaged(&mut random);
+        let options = Options {
+            mirror: random.one_in(8),
+            ..Options::default()
+        };
+        let seen = self.seen(seed, &bytes, &options);
+        let (name, size) = (seed.name.clone(), bytes.len() + seed.beside);
+        let excess = seen.peak.saturating_sub(PER_BYTE * size);
+        if let Some(tally) = self.tallies.get_mut(kind) {
+            tally.inputs += 1;
+            tally.read += u64::from(seen.read);
+            tally.longest = tally.longest.max(seen.seconds);
+            tally.peak = tally.peak.max(seen.peak);
+            tally.excess = tally.excess.max(excess);
+        }
+        let slow = || (seen.seconds > SOON).then(|| format!("it takes {:.1?}", seen.seconds));
+        let large = || (excess > FREE).then(|| format!("{} bytes for {size}", seen.peak));
+        if let Some(fault) = seen.fault.clone().or_else(slow).or_else(large) {
+            self.keep(&format!("{}-{input}-{name}", self.seed), &bytes);
+            eprintln!("input {input}, {name} ({kind}): {fault}");
+        }
+    }
+
+    /// Reads a damaged copy of `seed`.
+    fn seen(&self, seed: &Seed, bytes: &[u8], options: &Options) -> Seen {
+        let (name, read) = match seed.kind {
+            // A skeleton is read by way of a motion.
+            "ASF" => {
+                let path = self.folder.path().join("02.asf");
+                std::fs::write(path, bytes).expect("it is written");
+                ("02_01.amc", self.motion.as_slice())
+            }
+            _ => (seed.name.as_str(), bytes),
+        };
+        let folder = match seed.kind {
+            "glTF" => &seed.folder,
+            _ => self.folder.path(),
+        };
+        let mut seen = attempt(name, read, folder, options);
+        // Other programs may have taken the time, so what seems to be a record is looked at again.
+        if seen.seconds > self.tallies[seed.kind].longest {
+            let before = on_processor();
+            let again = attempt(name, read, folder, options).seconds;
+            let busy = before.and_then(|before| on_processor()?.checked_sub(before));
+            seen.seconds = busy.unwrap_or(again);
+        }
+        seen
+    }
+
+    fn keep(&mut self, name: &str, bytes: &[u8]) {
+        self.failures += 1;
+        std::fs::create_dir_all(&self.kept).expect("a folder");
+        std::fs::write(self.kept.join(name), bytes).expect("it is written");
+    }
+
+    fn report(&self) {
+        eprintln!("format: inputs, read, longest ms, most MiB, MiB beyond {PER_BYTE} × size");
+        let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+        for (kind, tally) in &self.tallies {
+            eprintln!(
+                "{kind}: {}, {}, {:.0}, {:.1}, {:.1}",
+                tally.inputs,
+                tally.read,
+                tally.longest.as_secs_f64() * 1e3,
+                mib(tally.peak),
+                mib(tally.excess)
+            );
+        }
+    }
+}
+
+/// How long this thread has been on a processor, where the system tells.
+fn on_processor() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(Duration::from_nanos(text.split(' ').next()?.parse().ok()?))
+}
+
+/// One reading.
+struct Seen {
+    read: bool,
+    seconds: Duration,
+    peak: usize,
+    fault: Option<String>,
+}
+
+fn attempt(name: &str, bytes: &[u8], folder: &Path, options: &Options) -> Seen {
+    let start = Instant::now();
+    let read = || import::read(bytes, name, Some(folder), options);
+    let (result, peak) = heap::peak_of(|| catch_unwind(AssertUnwindSafe(read)));
+    let seconds = start.elapsed();
+    let fault = match &result {
+        Err(_) => Some("it panics".to_owned()),
+        Ok(Err(error)) => {
+            let text = error.to_string();
+            let clear = text.starts_with(name) && text.len() < 2000 && !text.contains(['\n', '\r']);
+            (!clear).then(|| format!("no clear line: {text:.300?}"))
+        }
+        Ok(Ok(clip)) => {
+            let finite =
+                |t: &nalgebra::Isometry3<f64>| t.to_homogeneous().iter().all(|x| x.is_finite());
+            let whole =
+                |frame: &Vec<_>| frame.len() == clip.joints.len() && frame.iter().all(finite);
+            let whole = !clip.frames.is_empty() && clip.frames.iter().all(whole);
+            (!whole).then(|| "the clip isn't whole".to_owned())
+        }
+    };
+    Seen {
+        read: matches!(result, Ok(Ok(_))),
+        seconds,
+        peak,
+        fault,
+    }
+}
+
+fn setting(name: &str, usual: u64) -> u64 {
+    let text = std::env::var(name).ok();
+    text.map_or(usual, |text| text.parse().expect("a number"))
+}
+
+fn run(seed: u64, numbers: std::ops::Range<u64>) {
+    let kept = std::env::var_os("MIMIC_FUZZ_FOLDER");
+    let kept = kept.map_or_else(|| std::env::temp_dir().join("mimic-fuzz"), PathBuf::from);
+    let mut run = Run::new(seed, kept);
+    run.inputs(numbers);
+    run.report();
+    assert_eq!(run.failures, 0, "inputs that fail");
+    let dull = |tally: &Tally| tally.read == 0 || tally.read == tally.inputs;
+    let dull: Vec<_> = run
+        .tallies
+        .iter()
+        .filter(|(_, tally)| dull(tally))
+        .collect();
+    let dull: Vec<_> = dull.iter().map(|(kind, _)| kind).collect();
+    assert!(dull.is_empty(), "all or none of {dull:?} could be read");
+}
+
+#[test]
+fn some_inputs() {
+    run(1, 0..4000);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn many_inputs() {
+    let first = setting("MIMIC_FUZZ_FIRST", 0);
+    let inputs = setting("MIMIC_FUZZ_INPUTS", 1_000_000);
+    run(setting("MIMIC_FUZZ_SEED", 1), first..first + inputs);
+}

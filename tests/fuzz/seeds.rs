@@ -1,0 +1,169 @@
+//! The files that are damaged: our own clips, and small ones of others where they are at hand.
+
+use super::fbx::Fbx;
+use super::glb::Glb;
+use super::random::Random;
+use super::text::Text;
+use super::{json, plain};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+const OURS: [(&str, &str); 2] = [("FBX", "kick.fbx"), ("GLB", "walk.glb")];
+
+/// Kind and place in the collection of other people's files.
+const THEIRS: [(&str, &str); 47] = [
+    ("FBX", "torture-fbx/maya_anim_layers_7500_binary.fbx"),
+    ("FBX", "torture-fbx/maya_anim_interpolation_7700_binary.fbx"),
+    ("FBX", "torture-fbx/maya_rotation_order_7500_binary.fbx"),
+    ("FBX", "torture-fbx/maya_tangent_sign_7700_binary.fbx"),
+    ("FBX", "torture-fbx/max_transformed_skin_7500_binary.fbx"),
+    ("FBX", "torture-fbx/blender_340_z_up_7400_binary.fbx"),
+    ("FBX", "torture-fbx/blender_279_sausage_7400_binary.fbx"),
+    ("FBX", "torture-fbx/maya_long_keyframes_7700_binary.fbx"),
+    ("FBX", "torture-fbx/animation-space-z-up-m.fbx"),
+    ("FBX", "torture-fbx/maya_pivots_7500_binary.fbx"),
+    ("FBX", "torture-fbx/maya_resampled_7500_binary.fbx"),
+    (
+        "ASCII FBX",
+        "torture-fbx/synthetic_tcdefinition_127_7100_ascii.fbx",
+    ),
+    ("ASCII FBX", "torture-fbx/max2009_cube_anim_5800_ascii.fbx"),
+    (
+        "ASCII FBX",
+        "torture-fbx/maya_anim_interpolation_6100_ascii.fbx",
+    ),
+    ("ASCII FBX", "torture-fbx/maya_auto_clamp_7100_ascii.fbx"),
+    ("ASCII FBX", "torture-fbx/animation-multi-clip.fbx"),
+    (
+        "ASCII FBX",
+        "torture-fbx/maya_anim_layers_over_acc_7500_ascii.fbx",
+    ),
+    (
+        "ASCII FBX",
+        "torture-fbx/motionbuilder_tangent_tcb_7700_ascii.fbx",
+    ),
+    ("old FBX", "torture-fbx/max2009_cube_anim_5800_binary.fbx"),
+    ("old FBX", "torture-fbx/max2009_cube_anim_6100_binary.fbx"),
+    (
+        "old FBX",
+        "torture-fbx/maya_post_rotate_order_6100_binary.fbx",
+    ),
+    ("glTF", "khronos/interpolation_test.gltf"),
+    ("glTF", "khronos/rigged_simple.gltf"),
+    ("glTF", "torture-gltf/01_cs_rotate.gltf"),
+    ("glTF", "torture-gltf/03_all_animations.gltf"),
+    ("glTF", "torture-gltf/SimpleSkin.gltf"),
+    ("glTF", "torture-gltf/animation-splines-sharing.gltf"),
+    ("glTF", "torture-gltf/animation.gltf"),
+    ("GLB", "bitmoji/bitmoji_jump-flip.glb"),
+    ("GLB", "kenney/kenney_character.glb"),
+    ("GLB", "mixamo/animations-mixamo-default.glb"),
+    ("GLB", "torture-gltf/singleBlendshapeCube_sparse.glb"),
+    ("VRM", "vrm/basic_armature.vrm"),
+    ("VRM", "vrm/debug_robot.vrm"),
+    ("VRM", "vrm/test.vrma"),
+    ("BVH", "makehuman/mh_dance1.bvh"),
+    ("BVH", "games105/run_forward.bvh"),
+    ("BVH", "poser-bvh/run.bvh"),
+    ("BVH", "poser-bvh/jog.bvh"),
+    ("BVH", "cmu/jumping_jacks.bvh"),
+    ("AMC", "cmu/01_01.amc"),
+    ("ASF", "cmu/01.asf"),
+    ("DeepMimic", "deepmimic/humanoid3d_backflip.txt"),
+    ("DeepMimic", "deepmimic/humanoid3d_run.txt"),
+    ("DeepMimic", "deepmimic/humanoid3d_walk.txt"),
+    ("DeepMimic", "deepmimic/humanoid3d_jog.txt"),
+    ("DeepMimic", "deepmimic/dog3d_trot.txt"),
+];
+
+/// Bytes of a long motion that are used: its first lines.
+const AMC_BYTES: usize = 20_000;
+
+/// What is known of a file's structure.
+enum Form {
+    Fbx(Fbx),
+    Glb(Glb),
+    Json(Value),
+    Text(Text),
+}
+
+/// A file to be damaged.
+pub struct Seed {
+    pub kind: &'static str,
+    pub name: String,
+    /// Where files beside it are.
+    pub folder: PathBuf,
+    /// Bytes of those that are read with it.
+    pub beside: usize,
+    pub bytes: Vec<u8>,
+    form: Form,
+}
+
+/// All files that are at hand.
+pub fn all() -> Vec<Seed> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let ours = OURS.map(|(kind, name)| (kind, root.join("clips").join(name)));
+    let theirs = THEIRS.map(|(kind, name)| (kind, root.join("../shared/data").join(name)));
+    let files = ours.into_iter().chain(theirs);
+    let can_be_read = |kind: &str| cfg!(feature = "ufbx") || !kind.ends_with(" FBX");
+    let files = files.filter(|(kind, _)| can_be_read(kind));
+    files.filter_map(|(kind, path)| seed(kind, &path)).collect()
+}
+
+fn seed(kind: &'static str, path: &Path) -> Option<Seed> {
+    let Ok(mut bytes) = std::fs::read(path) else {
+        eprintln!("skipped: no {}", path.display());
+        return None;
+    };
+    if kind == "AMC" {
+        let end = bytes.iter().take(AMC_BYTES).rposition(|&b| b == b'\n');
+        bytes.truncate(end.map_or(0, |end| end + 1));
+    }
+    Some(Seed {
+        kind,
+        name: path.file_name()?.to_string_lossy().into_owned(),
+        folder: path.parent()?.to_owned(),
+        beside: beside(kind, path),
+        form: form(kind, &bytes)?,
+        bytes,
+    })
+}
+
+fn beside(kind: &str, path: &Path) -> usize {
+    let size = |path: &Path| std::fs::metadata(path).map_or(0, |about| about.len() as usize);
+    match kind {
+        "glTF" => size(&path.with_extension("bin")),
+        "AMC" => size(&path.with_file_name("01.asf")),
+        "ASF" => AMC_BYTES,
+        _ => 0,
+    }
+}
+
+fn form(kind: &str, bytes: &[u8]) -> Option<Form> {
+    Some(match kind {
+        "FBX" | "old FBX" => Form::Fbx(Fbx::parse(bytes)?),
+        "GLB" | "VRM" => Form::Glb(Glb::parse(bytes)?),
+        "glTF" | "DeepMimic" => Form::Json(serde_json::from_slice(bytes).ok()?),
+        _ => Form::Text(Text::new(bytes)),
+    })
+}
+
+impl Seed {
+    /// A damaged copy: two of three keep to the format's structure.
+    pub fn damaged(&self, random: &mut Random) -> Vec<u8> {
+        let mut bytes = self.bytes.clone();
+        if random.one_in(3) {
+            plain::mutate(&mut bytes, random);
+            return bytes;
+        }
+        match &self.form {
+            Form::Fbx(fbx) => fbx.mutated(random),
+            Form::Glb(glb) => glb.mutated(random),
+            Form::Json(value) => json::mutated(value, random),
+            Form::Text(text) => {
+                text.mutate(&mut bytes, random);
+                bytes
+            }
+        }
+    }
+}
