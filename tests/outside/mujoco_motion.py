@@ -43,7 +43,11 @@ def masses(model, header, ids):
         inertia.append((r @ np.diag(model.body_inertia[b]) @ r.T).ravel())
     return {
         "mass": relative([m["mass"] for m in ours], model.body_mass[ids]),
-        "centre of mass": relative([m["com"] for m in ours], model.body_ipos[ids]),
+        # Mass times centre: a body without mass has its centre nowhere.
+        "first moment": relative(
+            [m["mass"] * np.array(m["com"]) for m in ours],
+            model.body_mass[ids][:, None] * model.body_ipos[ids],
+        ),
         "inertia": max(relative(m["inertia"], i) for m, i in zip(ours, inertia)),
     }
 
