@@ -123,6 +123,7 @@ fn booth2020() -> Plan {
                 control_hz: 40.0,
                 steps_per_control: 5,
                 substeps: 1,
+                ..Settings::default()
             },
             // "The actions are used as target rotation for the joints."
             actions: Actions::FromRest { reach: 1.0 },

@@ -1,14 +1,11 @@
-//! The only room that knows rapier: a character under drives, gravity and ground contact.
+//! A character under drives, gravity and ground contact.
 //!
-//! Bodies are joined by rapier's impulse joints (maximal coordinates): on the characters that mimic is made for
-//! they cost a tenth of its multibodies, and a spherical multibody joint cannot be driven by position. What needs
-//! care is handled here and nowhere else:
-//! the drive frame of ball joints ([`World::set_targets`]), resets without a memory ([`World::reset`]), sleeping,
-//! damping and speed caps (off), and quarantined bodies ([`Diverged`]).
+//! Two engines move it, behind one [`World`]: our own in reduced coordinates, and rapier. Characters, targets and
+//! states are the same for both, so a skill that was learned in one can be performed in the other.
 
-mod build;
+mod articulated;
 mod character;
-mod convert;
+mod rapier;
 #[cfg(test)]
 mod tests;
 mod world;
@@ -18,16 +15,29 @@ pub use world::{LinkState, Target, World};
 
 use serde::{Deserialize, Serialize};
 
+/// What moves the character.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Engine {
+    /// Our own: reduced coordinates, drives that are stable at any gain.
+    #[default]
+    Articulated,
+    /// rapier's impulse joints: maximal coordinates.
+    Rapier,
+}
+
 /// Rates and solver settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Control steps per second; default 30.
     pub control_hz: f64,
-    /// rapier steps in one control step; default 2.
+    /// Physics steps in one control step; default 2.
     pub steps_per_control: u32,
-    /// Substeps in one rapier step, each of which integrates joints, drives and contacts; default 4.
+    /// Substeps in one physics step, each of which integrates joints, drives and contacts; default 4.
     pub substeps: u32,
+    /// Default [`Engine::Articulated`].
+    pub engine: Engine,
 }
 
 impl Default for Settings {
@@ -36,6 +46,7 @@ impl Default for Settings {
             control_hz: 30.0,
             steps_per_control: 2,
             substeps: 4,
+            engine: Engine::Articulated,
         }
     }
 }

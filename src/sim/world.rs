@@ -1,10 +1,9 @@
 //! One character on one ground.
 
-use super::build::{self, Built, Scene};
-use super::character::Character;
-use super::{Diverged, Settings, convert};
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
-use rapier3d::prelude::*;
+use super::articulated::Articulated;
+use super::rapier::Rapier;
+use super::{Character, Diverged, Engine, Settings};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 /// Where a link is and how it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +14,16 @@ pub struct LinkState {
     pub linear: Vector3<f32>,
     /// World axes, rad/s.
     pub angular: Vector3<f32>,
+}
+
+impl LinkState {
+    fn at_rest() -> Self {
+        LinkState {
+            pose: Isometry3::identity(),
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+        }
+    }
 }
 
 /// Where a drive should turn its link.
@@ -28,88 +37,40 @@ pub enum Target {
     Hinge(f32),
 }
 
+/// What moves the links.
+enum Mover {
+    Articulated(Box<Articulated>),
+    Rapier(Box<Rapier>),
+}
+
 /// A character that moves under its drives.
 pub struct World {
     settings: Settings,
-    parameters: IntegrationParameters,
-    pipeline: PhysicsPipeline,
-    pristine: Scene,
-    scene: Scene,
-    multibodies: MultibodyJointSet,
-    soft_bodies: SoftBodySet,
-    ccd: CCDSolver,
-    bodies: Vec<RigidBodyHandle>,
-    joints: Vec<Option<ImpulseJointHandle>>,
-    /// Per link: rotation of the joint's first frame at rest, in the parent's frame, and the joint's own axes.
-    frames: Vec<(UnitQuaternion<f32>, UnitQuaternion<f32>)>,
-    ground: ColliderHandle,
-    coms: Vec<Vector3<f32>>,
-    /// Per link, as built: mass and inertia about the centre of mass.
-    masses: Vec<(f32, Matrix3<f32>)>,
+    mover: Mover,
     states: Vec<LinkState>,
     contacts: Vec<bool>,
 }
 
 impl World {
     pub fn new(character: &Character, settings: Settings) -> Self {
-        let Built {
-            scene,
-            bodies,
-            joints,
-            ground,
-        } = build::build(character);
-        let at_rest = LinkState {
-            pose: Isometry3::identity(),
-            linear: Vector3::zeros(),
-            angular: Vector3::zeros(),
-        };
         World {
             settings,
-            parameters: build::parameters(&settings),
-            pipeline: PhysicsPipeline::new(),
-            pristine: scene.clone(),
-            scene,
-            multibodies: MultibodyJointSet::new(),
-            soft_bodies: SoftBodySet::new(),
-            ccd: CCDSolver::new(),
-            frames: character
-                .links
-                .iter()
-                .map(|link| {
-                    let axes = build::basis(&link.joint);
-                    (link.rest.rotation.cast(), axes.cast())
-                })
-                .collect(),
-            ground,
-            coms: character.links.iter().map(|link| link.com.cast()).collect(),
-            masses: character
-                .links
-                .iter()
-                .map(|link| (link.mass as f32, link.inertia.cast()))
-                .collect(),
-            states: vec![at_rest; bodies.len()],
-            contacts: vec![false; bodies.len()],
-            bodies,
-            joints,
+            mover: match settings.engine {
+                Engine::Articulated => {
+                    Mover::Articulated(Box::new(Articulated::new(character, settings)))
+                }
+                Engine::Rapier => Mover::Rapier(Box::new(Rapier::new(character, settings))),
+            },
+            states: vec![LinkState::at_rest(); character.links.len()],
+            contacts: vec![false; character.links.len()],
         }
     }
 
-    /// Puts every link where `states` says, with nothing left of the past.
-    ///
-    /// rapier starts a step's contacts from the impulses of the step before, also when the bodies were teleported
-    /// in between, and keeps islands, contact pairs and their order. So a reset works on a copy of the world as it
-    /// was built, and gives the same bits as a new one.
+    /// Puts every link where `states` says, with nothing left of the past: the world then moves as a new one, to the bit.
     pub fn reset(&mut self, states: &[LinkState]) {
-        self.scene.clone_from(&self.pristine);
-        for (i, state) in states.iter().enumerate() {
-            let body = &mut self.scene.bodies[self.bodies[i]];
-            let arm = state.pose.rotation * self.coms[i];
-            body.set_position(convert::pose(&state.pose), false);
-            body.set_linvel(
-                convert::vector(state.linear + state.angular.cross(&arm)),
-                false,
-            );
-            body.set_angvel(convert::vector(state.angular), false);
+        match &mut self.mover {
+            Mover::Articulated(mover) => mover.reset(states),
+            Mover::Rapier(mover) => mover.reset(states),
         }
         self.states.copy_from_slice(states);
         self.contacts.fill(false);
@@ -117,88 +78,45 @@ impl World {
 
     /// Until the next reset all masses and inertias are `mass` times what they are, and friction `friction` times.
     pub fn vary(&mut self, mass: f32, friction: f32) {
-        for ((handle, (own, inertia)), com) in self.bodies.iter().zip(&self.masses).zip(&self.coms)
-        {
-            let scaled = MassProperties::with_inertia_matrix(
-                convert::vector(*com),
-                own * mass,
-                convert::matrix(&(inertia * mass)),
-            );
-            self.scene.bodies[*handle].set_additional_mass_properties(scaled, false);
-        }
-        for (_, collider) in self.scene.colliders.iter_mut() {
-            collider.set_friction(collider.friction() * friction);
+        match &mut self.mover {
+            Mover::Articulated(mover) => mover.vary(mass, friction),
+            Mover::Rapier(mover) => mover.vary(mass, friction),
         }
     }
 
-    /// Gives a link an impulse at its centre of mass, world axes, N·s. Its mass is that of the last step.
+    /// Gives a link an impulse at its centre of mass, world axes, N·s.
     pub fn push(&mut self, link: usize, impulse: Vector3<f32>) {
-        let body = &mut self.scene.bodies[self.bodies[link]];
-        let mass = body.mass();
-        if mass > 0.0 {
-            let velocity = body.linvel() + convert::vector(impulse / mass);
-            body.set_linvel(velocity, true);
+        match &mut self.mover {
+            Mover::Articulated(mover) => mover.push(link, impulse),
+            Mover::Rapier(mover) => mover.push(link, impulse),
         }
     }
 
     /// Sets what the drives hold until the next call; one target per link.
-    ///
-    /// rapier's motors measure a ball joint's error axis by axis as 2·asin of the quaternion's imaginary part, which
-    /// is wrong far from zero. So the joint's first frame is turned to the target, and the motors hold zero: there
-    /// the measure is exact to third order, and every ball is a true spherical PD drive.
     pub fn set_targets(&mut self, targets: &[Target]) {
-        for (i, target) in targets.iter().enumerate() {
-            let Some(handle) = self.joints[i] else {
-                continue;
-            };
-            let Some(joint) = self.scene.joints.get_mut(handle, false) else {
-                continue;
-            };
-            let (rest, axes) = self.frames[i];
-            match target {
-                Target::Free => {}
-                Target::Ball(turn) => {
-                    joint.data.local_frame1.rotation = convert::rotation(rest * turn * axes)
-                }
-                Target::Hinge(angle) => {
-                    joint.data.motors[JointAxis::AngX as usize].target_pos = *angle
-                }
-            }
+        match &mut self.mover {
+            Mover::Articulated(mover) => mover.set_targets(targets),
+            Mover::Rapier(mover) => mover.set_targets(targets),
         }
     }
 
     /// Advances by one control step.
     ///
     /// # Errors
-    /// [`Diverged`] when a body stopped being finite; the world then needs a reset.
+    /// [`Diverged`] when a body stopped being finite or left the world; it then needs a reset.
     pub fn step(&mut self) -> Result<(), Diverged> {
-        for _ in 0..self.settings.steps_per_control {
-            self.pipeline.step(
-                Vector::new(0.0, 0.0, -9.81),
-                &self.parameters,
-                &mut self.scene.islands,
-                &mut self.scene.broad_phase,
-                &mut self.scene.narrow_phase,
-                &mut self.scene.bodies,
-                &mut self.scene.colliders,
-                &mut self.scene.joints,
-                &mut self.multibodies,
-                &mut self.soft_bodies,
-                &mut self.ccd,
-                &(),
-                &(),
-            );
-            if !self.pipeline.quarantine().bodies().is_empty() {
-                return Err(Diverged);
+        match &mut self.mover {
+            Mover::Articulated(mover) => {
+                mover.step(&mut self.contacts)?;
+                mover.read(&mut self.states);
+            }
+            Mover::Rapier(mover) => {
+                mover.step()?;
+                mover.read(&mut self.states, &mut self.contacts);
             }
         }
-        self.read_states();
-        self.read_contacts();
-        if self
-            .states
-            .iter()
-            .all(|s| s.pose.translation.vector.norm() < 1e4)
-        {
+        let near = |s: &LinkState| s.pose.translation.vector.norm() < FARTHEST;
+        if self.states.iter().all(near) {
             Ok(())
         } else {
             Err(Diverged)
@@ -210,7 +128,7 @@ impl World {
         &self.states
     }
 
-    /// Per link: whether it pressed on the ground in the last step.
+    /// Per link: whether it pressed on the ground in the last of the control step's physics steps.
     pub fn contacts(&self) -> &[bool] {
         &self.contacts
     }
@@ -218,29 +136,7 @@ impl World {
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
-
-    fn read_states(&mut self) {
-        for ((state, handle), com) in self.states.iter_mut().zip(&self.bodies).zip(&self.coms) {
-            let body = &self.scene.bodies[*handle];
-            state.pose = convert::from_pose(body.position());
-            state.angular = convert::from_vector(body.angvel());
-            let arm = state.pose.rotation * com;
-            state.linear = convert::from_vector(body.linvel()) - state.angular.cross(&arm);
-        }
-    }
-
-    fn read_contacts(&mut self) {
-        self.contacts.fill(false);
-        for pair in self.scene.narrow_phase.contact_pairs_with(self.ground) {
-            let other = if pair.collider1 == self.ground {
-                pair.collider2
-            } else {
-                pair.collider1
-            };
-            let pressed = pair.total_impulse_magnitude() > 0.0;
-            if pressed && let Some(collider) = self.scene.colliders.get(other) {
-                self.contacts[collider.user_data as usize] = true;
-            }
-        }
-    }
 }
+
+/// Metres from the origin beyond which a character is lost.
+const FARTHEST: f32 = 1e4;

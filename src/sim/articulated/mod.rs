@@ -1,0 +1,113 @@
+//! Our own engine: a character in reduced coordinates on a plane.
+//!
+//! Joints can't come apart, as they are the coordinates. A step is semi-implicit: drives are taken at its end, so that
+//! they are stable at any gain, and contacts and stops are solved over the inertia of the whole character. All state
+//! is in [`Pose`], but for what a step hands to the next: contact impulses and drives at their limit.
+
+mod contact;
+mod dynamics;
+mod matrix;
+mod pose;
+mod spatial;
+mod tree;
+
+use super::world::{LinkState, Target};
+use super::{Character, Diverged, Settings};
+use contact::Contacts;
+use dynamics::Dynamics;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use pose::Pose;
+use tree::Tree;
+
+pub(super) struct Articulated {
+    tree: Tree,
+    pose: Pose,
+    dynamics: Dynamics,
+    contacts: Contacts,
+    /// Per node; of a hinge the real part is its angle.
+    targets: Vec<UnitQuaternion<f32>>,
+    /// Velocity before a step.
+    before: Vec<f32>,
+    settings: Settings,
+    mass: f32,
+    friction: f32,
+}
+
+impl Articulated {
+    pub fn new(character: &Character, settings: Settings) -> Self {
+        let tree = Tree::new(character);
+        Articulated {
+            pose: Pose::new(&tree),
+            dynamics: Dynamics::new(&tree),
+            contacts: Contacts::new(&tree),
+            targets: vec![UnitQuaternion::identity(); tree.nodes.len()],
+            before: vec![0.0; tree.dofs()],
+            tree,
+            settings,
+            mass: 1.0,
+            friction: 1.0,
+        }
+    }
+
+    pub fn reset(&mut self, states: &[LinkState]) {
+        self.pose.set(&self.tree, states);
+        self.dynamics.reset();
+        self.contacts.reset();
+        (self.mass, self.friction) = (1.0, 1.0);
+    }
+
+    pub fn vary(&mut self, mass: f32, friction: f32) {
+        (self.mass, self.friction) = (mass, friction);
+    }
+
+    pub fn push(&mut self, node: usize, impulse: Vector3<f32>) {
+        self.dynamics.push(node, impulse);
+    }
+
+    pub fn set_targets(&mut self, targets: &[Target]) {
+        for (own, target) in self.targets.iter_mut().zip(targets) {
+            match target {
+                Target::Free => {}
+                Target::Ball(turn) => *own = *turn,
+                Target::Hinge(angle) => {
+                    *own = UnitQuaternion::new_unchecked(Quaternion::from_real(*angle))
+                }
+            }
+        }
+    }
+
+    pub fn step(&mut self, contacts: &mut [bool]) -> Result<(), Diverged> {
+        let substeps = self.settings.substeps;
+        let dt = (1.0 / self.settings.physics_hz()) as f32;
+        for _ in 0..self.settings.steps_per_control {
+            contacts.fill(false);
+            for _ in 0..substeps {
+                self.substep(dt, contacts);
+            }
+            if !self.pose.velocity.iter().all(|v| v.is_finite()) {
+                return Err(Diverged);
+            }
+        }
+        Ok(())
+    }
+
+    pub fn read(&self, states: &mut [LinkState]) {
+        self.pose.read(&self.tree, states);
+    }
+
+    fn substep(&mut self, dt: f32, contacts: &mut [bool]) {
+        let (tree, pose) = (&self.tree, &mut self.pose);
+        self.before.copy_from_slice(&pose.velocity);
+        self.dynamics
+            .accelerate(tree, pose, &self.targets, (dt, self.mass));
+        self.contacts
+            .resolve(tree, pose, &self.dynamics, (dt, self.friction), contacts);
+        let changes = pose
+            .velocity
+            .iter()
+            .zip(&self.before)
+            .map(|(after, before)| after - before);
+        self.dynamics.saturate(tree, changes, dt);
+        pose.advance(tree, dt);
+    }
+}
