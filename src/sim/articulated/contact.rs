@@ -1,66 +1,68 @@
-//! Where the ground and the ends of hinges' ranges push, and how hard.
+//! Where the ground pushes, and how hard.
 //!
-//! All rows are velocities that must not be negative: those of points towards the ground, those of hinges towards
-//! their end. They are solved for impulses together, by sweeps of projected Gauss-Seidel over the rows' own matrix
-//! A = J M⁻¹ Jᵀ, which holds the drives' stiffness too; friction stays in Coulomb's cone.
+//! Every point near the ground has an impulse, which must stop it from going into the ground, can't pull, and rubs
+//! within Coulomb's cone. All are solved together, by sweeps of projected Gauss-Seidel. What an impulse on one body
+//! does to the twist of another, J M⁻¹ J'ᵀ, is computed for whole bodies, six by six: points of a body share it. The
+//! drives are in it too, as they are in M.
 
 use super::dynamics::Dynamics;
-use super::matrix::PathMatrix;
-use super::pose::Pose;
-use super::spatial::Motion;
-use super::tree::{Joint, Tree};
-use nalgebra::Vector3;
+use super::pose::{Place, Pose, four, three};
+use super::spatial::{Force, Motion};
+use super::tree::Tree;
+use nalgebra::{Matrix3, Vector3};
+use wide::f32x4;
 
-/// Points nearer to the ground than this at the end of a step are looked at, metres; hinges nearer to their end, radians.
+/// Points nearer to the ground than this at the end of a step are looked at, metres.
 const NEAR: f32 = 0.005;
-/// Share of a depth that is taken back in one step, and the fastest that it may be, m/s or rad/s.
+/// Share of a depth that is taken back in one step, and the fastest that it may be, m/s.
 const RECOVERY: f32 = 0.2;
 const FASTEST: f32 = 0.5;
-/// Added to the diagonal, as a share of it: of redundant points, each bears its part.
+/// Added to a point's own response, as a share of it: of redundant points, each bears its part.
 const SOFTNESS: f32 = 1e-3;
+/// Most passes over all points, which start from the impulses of the step before; and the change, m/s, below which a
+/// pass is the last.
+const SWEEPS: usize = 12;
+const STILL: f32 = 1e-4;
 
-/// Passes over all rows, which start from the impulses of the step before.
-const SWEEPS: usize = 8;
+/// Twist of a body: its angular velocity, and that of its frame's origin.
+type Twist = [f32x4; 2];
 
-/// What a row's impulse may be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    /// A hinge at the end of its range.
-    Stops,
-    /// A point on the ground.
-    Presses,
-    /// This row and the next: no longer together than a share of the impulse in the row before.
-    Rubs(f32),
-    /// The second row of friction.
-    Follows,
+/// A body that touches the ground.
+#[derive(Clone, Copy, Debug)]
+struct Toucher {
+    node: usize,
+    twist: Twist,
+    /// Moment about its origin and force: sum of its points' impulses.
+    wrench: [f32; 6],
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Row {
-    node: usize,
-    /// Length of the path that it runs along, which is that of its last coordinate.
-    length: usize,
-    kind: Kind,
-    /// Velocity that it must have, if not more.
+struct Point {
+    toucher: usize,
+    /// From the body's origin.
+    arm: Vector3<f32>,
+    /// Vertical velocity that it must have, if not more.
     wanted: f32,
-    /// Which contact it is, to find its impulse in the next step.
+    friction: f32,
+    impulse: Vector3<f32>,
+    /// Its velocity for each impulse on itself.
+    response: Matrix3<f32>,
+    /// Which point of the tree it is.
     id: usize,
 }
 
-/// Contacts and stops of one step.
+/// Contacts of one step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Contacts {
-    rows: Vec<Row>,
-    /// `[rows, width]`: halved Jacobians, zero beyond their length.
-    halves: Vec<f32>,
+    touchers: Vec<Toucher>,
+    points: Vec<Point>,
+    /// `[touchers, width]`: halved Jacobians of their twists, along their paths.
+    halves: Vec<[f32x4; 6]>,
     width: usize,
-    /// `[rows, rows]`.
-    matrix: Vec<f32>,
-    velocities: Vec<f32>,
-    impulses: Vec<f32>,
+    /// `[touchers, touchers]`: twist of the first for each part of the wrench on the second.
+    coupling: Vec<[Twist; 6]>,
     /// By id, of the last step.
-    last: Vec<f32>,
-    sum: Vec<f32>,
+    last: Vec<Vector3<f32>>,
 }
 
 impl Contacts {
@@ -68,218 +70,267 @@ impl Contacts {
         let points: usize = tree.nodes.iter().map(|node| node.points.len()).sum();
         Contacts {
             width: tree.nodes.iter().map(|n| n.path.len()).max().unwrap_or(0),
-            last: vec![0.0; 3 * points + 2 * tree.nodes.len()],
-            sum: vec![0.0; tree.dofs()],
+            last: vec![Vector3::zeros(); points],
             ..Contacts::default()
         }
     }
 
     /// Forgets the steps before.
     pub fn reset(&mut self) {
-        self.last.fill(0.0);
+        self.last.fill(Vector3::zeros());
     }
 
-    /// Changes the velocity so that nothing goes on into the ground or beyond its range, and marks in `pressed` the
-    /// nodes that push on the ground.
+    /// Adds to the half solution what keeps the character out of the ground, and marks in `pressed` the nodes that
+    /// push on it. Returns the ground's impulse on the character.
     pub fn resolve(
         &mut self,
         tree: &Tree,
-        pose: &mut Pose,
-        dynamics: &Dynamics,
+        pose: &Pose,
+        dynamics: &mut Dynamics,
         (dt, friction): (f32, f32),
         pressed: &mut [bool],
-    ) {
-        self.rows.clear();
-        self.halves.clear();
-        self.velocities.clear();
+    ) -> Force {
         self.find(tree, pose, &dynamics.motions, (dt, friction));
-        if self.rows.is_empty() {
-            self.last.fill(0.0);
-            return;
+        if self.points.is_empty() {
+            self.reset();
+            return Force::default();
         }
-        self.couple(tree, &dynamics.matrix);
+        self.halve(tree, pose, dynamics);
+        self.couple(tree);
+        self.respond();
         self.solve();
-        self.apply(tree, pose, &dynamics.matrix);
-        for (row, impulse) in self.rows.iter().zip(&self.impulses) {
-            pressed[row.node] |= row.kind == Kind::Presses && *impulse > 0.0;
-        }
+        self.apply(tree, &mut dynamics.change);
+        self.report(pose, pressed)
     }
 
     fn find(&mut self, tree: &Tree, pose: &Pose, motions: &[Motion], (dt, friction): (f32, f32)) {
+        self.touchers.clear();
+        self.points.clear();
         let mut id = 0;
         for (i, node) in tree.nodes.iter().enumerate() {
-            let place = &pose.nodes[i];
+            let place = &pose.places[i];
+            let friction = friction * node.friction;
+            let first = self.points.len();
             for (point, radius) in &node.points {
-                let mut at = place.translation.vector + place.rotation * point;
-                at.z -= radius;
-                let gap = at.z + pose.origin.z;
-                if gap < NEAR || gap + dt * motions[i].at(&at).z < NEAR {
-                    self.touch(tree, pose, (i, &at), gap / dt, friction * node.friction, id);
+                let mut arm = place.matrix * point;
+                arm.z -= radius;
+                let gap = arm.z + place.origin.z + pose.origin.z;
+                if gap < NEAR || gap + dt * motions[i].at(&(place.origin + arm)).z < NEAR {
+                    self.touch(arm, wanted(gap / dt), friction, id);
                 }
-                id += 3;
+                id += 1;
             }
-        }
-        for (i, node) in tree.nodes.iter().enumerate() {
-            if let Joint::Hinge(_, Some(range)) = node.joint {
-                let rate = pose.velocity[node.dofs.start];
-                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    let gap = (pose.angles[i] - range[side]) * sign;
-                    if gap + dt * rate * sign < NEAR {
-                        self.stop(tree, i, (gap / dt, sign, rate), id + side);
-                    }
-                }
+            if self.points.len() > first {
+                self.touchers.push(toucher(i, place, &motions[i]));
             }
-            id += 2;
         }
     }
 
-    /// Three rows of a point, along z, x and y.
-    fn touch(
-        &mut self,
-        tree: &Tree,
-        pose: &Pose,
-        (node, at): (usize, &Vector3<f32>),
-        room: f32,
-        friction: f32,
-        id: usize,
-    ) {
-        let path = &tree.nodes[node].path;
-        let kinds = [Kind::Presses, Kind::Rubs(friction), Kind::Follows];
-        for (k, (axis, kind)) in [2, 0, 1].into_iter().zip(kinds).enumerate() {
-            let start = self.halves.len();
-            self.halves
-                .extend(path.iter().map(|&j| pose.axes[j].at(at)[axis]));
-            let wanted = if k == 0 { wanted(room) } else { 0.0 };
-            self.push(
-                pose,
-                path,
-                Row {
-                    node,
-                    length: path.len(),
-                    kind,
-                    wanted,
-                    id: id + k,
-                },
-                start,
-            );
-        }
-    }
-
-    /// One row of a hinge.
-    fn stop(&mut self, tree: &Tree, node: usize, (room, sign, rate): (f32, f32, f32), id: usize) {
-        let path = &tree.nodes[node].path;
-        let start = self.halves.len();
-        self.halves.resize(start + path.len() - 1, 0.0);
-        self.halves.push(sign);
-        let wanted = wanted(room);
-        self.rows.push(Row {
-            node,
-            length: path.len(),
-            kind: Kind::Stops,
+    fn touch(&mut self, arm: Vector3<f32>, wanted: f32, friction: f32, id: usize) {
+        self.points.push(Point {
+            toucher: self.touchers.len(),
+            arm,
             wanted,
+            friction,
+            impulse: self.last[id],
+            response: Matrix3::zeros(),
             id,
         });
-        self.velocities.push(rate * sign - wanted);
-        self.halves.resize(start + self.width, 0.0);
     }
 
-    fn push(&mut self, pose: &Pose, path: &[usize], row: Row, start: usize) {
-        let jacobian = self.halves[start..].iter().zip(path);
-        let velocity: f32 = jacobian.map(|(j, &k)| j * pose.velocity[k]).sum();
-        self.velocities.push(velocity - row.wanted);
-        self.rows.push(row);
-        self.halves.resize(start + self.width, 0.0);
-    }
-
-    /// Halves the Jacobians and multiplies them with each other.
-    fn couple(&mut self, tree: &Tree, matrix: &PathMatrix) {
-        let (count, width) = (self.rows.len(), self.width);
-        for (row, half) in self.rows.iter().zip(self.halves.chunks_exact_mut(width)) {
-            matrix.halve(&tree.nodes[row.node].path, &mut half[..row.length]);
-        }
-        self.matrix.resize(count * count, 0.0);
-        for a in 0..count {
-            for b in 0..=a {
-                let shared = tree.shared(self.rows[a].node, self.rows[b].node);
-                let of = |row: usize| &self.halves[row * width..row * width + shared];
-                let product: f32 = of(a).iter().zip(of(b)).map(|(x, y)| x * y).sum();
-                self.matrix[a * count + b] = product;
-                self.matrix[b * count + a] = product;
+    /// Halves the Jacobians of the touchers, and adds to their twists what the step does without contacts.
+    fn halve(&mut self, tree: &Tree, pose: &Pose, dynamics: &Dynamics) {
+        self.halves.clear();
+        self.halves
+            .resize(self.touchers.len() * self.width, [f32x4::ZERO; 6]);
+        let halves = self.halves.chunks_exact_mut(self.width);
+        for (toucher, half) in self.touchers.iter_mut().zip(halves) {
+            let path = &tree.nodes[toucher.node].path;
+            let origin = &pose.places[toucher.node].origin;
+            for (half, &block) in half.iter_mut().zip(path) {
+                let [a, b, c] = pose.axes[block].angular;
+                let [x, y, z] = pose.axes[block].at(origin);
+                *half = [a, b, c, x, y, z];
             }
-            self.matrix[a * count + a] *= 1.0 + SOFTNESS;
+            dynamics.matrix.halve_rows(path, &mut half[..path.len()]);
+            let mut sums = [f32x4::ZERO; 6];
+            for (half, &block) in half.iter().zip(path) {
+                for (sum, row) in sums.iter_mut().zip(half) {
+                    *sum += *row * dynamics.change[block];
+                }
+            }
+            let change = twist(sums);
+            toucher.twist[0] += change[0];
+            toucher.twist[1] += change[1];
+        }
+    }
+
+    fn couple(&mut self, tree: &Tree) {
+        let count = self.touchers.len();
+        self.coupling.clear();
+        for a in 0..count {
+            for b in 0..count {
+                let shared = tree.shared(self.touchers[a].node, self.touchers[b].node);
+                let of = |i: usize| &self.halves[i * self.width..i * self.width + shared];
+                self.coupling.push(std::array::from_fn(|k| {
+                    let mut sums = [f32x4::ZERO; 6];
+                    for (x, y) in of(a).iter().zip(of(b)) {
+                        for (sum, row) in sums.iter_mut().zip(x) {
+                            *sum += *row * y[k];
+                        }
+                    }
+                    twist(sums)
+                }));
+            }
+        }
+    }
+
+    /// What each point does for itself, and where the impulses of the last step lead.
+    fn respond(&mut self) {
+        let count = self.touchers.len();
+        for i in 0..self.points.len() {
+            let Point {
+                toucher,
+                arm,
+                impulse,
+                ..
+            } = self.points[i];
+            let own = &self.coupling[toucher * (count + 1)];
+            for axis in 0..3 {
+                let mut unit = Vector3::zeros();
+                unit[axis] = 1.0;
+                let velocity = at(&answer(own, &wrench(&arm, &unit)), &arm);
+                self.points[i].response.set_column(axis, &velocity);
+            }
+            self.points[i].response[(2, 2)] *= 1.0 + SOFTNESS;
+            if impulse != Vector3::zeros() {
+                self.spread(toucher, &arm, &impulse);
+            }
         }
     }
 
     fn solve(&mut self) {
-        let count = self.rows.len();
-        self.impulses.clear();
-        self.impulses
-            .extend(self.rows.iter().map(|row| self.last[row.id]));
-        for i in 0..count {
-            let impulse = self.impulses[i];
-            self.spread(i, impulse);
-        }
         for _ in 0..SWEEPS {
-            for i in 0..count {
-                match self.rows[i].kind {
-                    Kind::Stops | Kind::Presses => self.press(i),
-                    Kind::Rubs(friction) => self.rub(i, friction),
-                    Kind::Follows => {}
+            let mut largest: f32 = 0.0;
+            for i in 0..self.points.len() {
+                let Point {
+                    toucher,
+                    arm,
+                    impulse,
+                    response,
+                    ..
+                } = self.points[i];
+                let velocity = at(&self.touchers[toucher].twist, &arm);
+                let next = self.points[i].next(velocity);
+                let change = next - impulse;
+                if change != Vector3::zeros() {
+                    self.points[i].impulse = next;
+                    self.spread(toucher, &arm, &change);
+                    largest = largest.max(change.norm() * response[(2, 2)]);
+                }
+            }
+            if largest < STILL {
+                break;
+            }
+        }
+        self.last.fill(Vector3::zeros());
+        for point in &self.points {
+            self.last[point.id] = point.impulse;
+        }
+    }
+
+    /// Gives an impulse at a point of a toucher.
+    fn spread(&mut self, toucher: usize, arm: &Vector3<f32>, impulse: &Vector3<f32>) {
+        let count = self.touchers.len();
+        let wrench = wrench(arm, impulse);
+        for (sum, part) in self.touchers[toucher].wrench.iter_mut().zip(&wrench) {
+            *sum += part;
+        }
+        for (a, other) in self.touchers.iter_mut().enumerate() {
+            let change = answer(&self.coupling[a * count + toucher], &wrench);
+            other.twist[0] += change[0];
+            other.twist[1] += change[1];
+        }
+    }
+
+    fn apply(&self, tree: &Tree, change: &mut [f32x4]) {
+        for (toucher, half) in self
+            .touchers
+            .iter()
+            .zip(self.halves.chunks_exact(self.width))
+        {
+            let wrench = toucher.wrench.map(f32x4::splat);
+            for (half, &block) in half.iter().zip(&tree.nodes[toucher.node].path) {
+                for (row, part) in half.iter().zip(&wrench) {
+                    change[block] += *row * *part;
                 }
             }
         }
-        self.last.fill(0.0);
-        for (row, impulse) in self.rows.iter().zip(&self.impulses) {
-            self.last[row.id] = *impulse;
+    }
+
+    fn report(&self, pose: &Pose, pressed: &mut [bool]) -> Force {
+        let mut sum = Force::default();
+        for point in &self.points {
+            let node = self.touchers[point.toucher].node;
+            pressed[node] |= point.impulse.z > 0.0;
+            sum += Force::at(point.impulse, &(pose.places[node].origin + point.arm));
         }
+        sum
     }
+}
 
-    fn spread(&mut self, i: usize, impulse: f32) {
-        if impulse != 0.0 {
-            let row = &self.matrix[i * self.rows.len()..(i + 1) * self.rows.len()];
-            for (velocity, a) in self.velocities.iter_mut().zip(row) {
-                *velocity += a * impulse;
-            }
-        }
-    }
-
-    /// The impulse that would stop row `i`.
-    fn stopping(&self, i: usize) -> f32 {
-        self.impulses[i] - self.velocities[i] / self.matrix[i * (self.rows.len() + 1)]
-    }
-
-    fn set(&mut self, i: usize, impulse: f32) {
-        let change = impulse - self.impulses[i];
-        self.impulses[i] = impulse;
-        self.spread(i, change);
-    }
-
-    fn press(&mut self, i: usize) {
-        self.set(i, self.stopping(i).max(0.0));
-    }
-
-    fn rub(&mut self, i: usize, friction: f32) {
-        let most = friction * self.impulses[i - 1];
-        let [x, y] = [self.stopping(i), self.stopping(i + 1)];
-        let length = (x * x + y * y).sqrt();
+impl Point {
+    /// Impulse that stops the point, as far as it may, given its velocity under the present one.
+    fn next(&self, velocity: Vector3<f32>) -> Vector3<f32> {
+        let (now, response) = (self.impulse, &self.response);
+        // Softness resists the whole impulse, not only its change.
+        let lag = now.z * response[(2, 2)] * SOFTNESS;
+        let up = (now.z - (velocity.z - self.wanted + lag) / response[(2, 2)]).max(0.0);
+        let along = |k: usize| {
+            let after = velocity[k] + response[(k, 2)] * (up - now.z);
+            now[k] - after / response[(k, k)]
+        };
+        let [x, y] = [along(0), along(1)];
+        let (most, length) = (self.friction * up, (x * x + y * y).sqrt());
         let share = if length > most { most / length } else { 1.0 };
-        self.set(i, x * share);
-        self.set(i + 1, y * share);
+        Vector3::new(x * share, y * share, up)
     }
+}
 
-    fn apply(&mut self, tree: &Tree, pose: &mut Pose, matrix: &PathMatrix) {
-        self.sum.fill(0.0);
-        let halves = self.halves.chunks_exact(self.width);
-        for ((row, half), impulse) in self.rows.iter().zip(halves).zip(&self.impulses) {
-            for (entry, &k) in half.iter().zip(&tree.nodes[row.node].path) {
-                self.sum[k] += entry * impulse;
-            }
-        }
-        matrix.unhalve(&mut self.sum);
-        for (velocity, change) in pose.velocity.iter_mut().zip(&self.sum) {
-            *velocity += change;
-        }
+fn toucher(node: usize, place: &Place, motion: &Motion) -> Toucher {
+    Toucher {
+        node,
+        twist: [four(&motion.angular), four(&motion.at(&place.origin))],
+        wrench: [0.0; 6],
     }
+}
+
+fn twist(sums: [f32x4; 6]) -> Twist {
+    let [a, b, c, x, y, z] = sums.map(f32x4::reduce_add);
+    [f32x4::from([a, b, c, 0.0]), f32x4::from([x, y, z, 0.0])]
+}
+
+fn wrench(arm: &Vector3<f32>, impulse: &Vector3<f32>) -> [f32; 6] {
+    let moment = arm.cross(impulse);
+    [
+        moment.x, moment.y, moment.z, impulse.x, impulse.y, impulse.z,
+    ]
+}
+
+/// Twist that a wrench makes.
+fn answer(coupling: &[Twist; 6], wrench: &[f32; 6]) -> Twist {
+    let mut sum = [f32x4::ZERO; 2];
+    for (column, part) in coupling.iter().zip(wrench) {
+        let part = f32x4::splat(*part);
+        sum[0] += column[0] * part;
+        sum[1] += column[1] * part;
+    }
+    sum
+}
+
+/// Velocity at a point of a body.
+fn at(twist: &Twist, arm: &Vector3<f32>) -> Vector3<f32> {
+    three(twist[1]) + three(twist[0]).cross(arm)
 }
 
 /// Velocity that leaves no more than `room` metres a second to go, or recovers from a depth.

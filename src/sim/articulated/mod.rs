@@ -26,8 +26,6 @@ pub(super) struct Articulated {
     contacts: Contacts,
     /// Per node; of a hinge the real part is its angle.
     targets: Vec<UnitQuaternion<f32>>,
-    /// Velocity before a step.
-    before: Vec<f32>,
     settings: Settings,
     mass: f32,
     friction: f32,
@@ -41,7 +39,6 @@ impl Articulated {
             dynamics: Dynamics::new(&tree),
             contacts: Contacts::new(&tree),
             targets: vec![UnitQuaternion::identity(); tree.nodes.len()],
-            before: vec![0.0; tree.dofs()],
             tree,
             settings,
             mass: 1.0,
@@ -51,13 +48,14 @@ impl Articulated {
 
     pub fn reset(&mut self, states: &[LinkState]) {
         self.pose.set(&self.tree, states);
-        self.dynamics.reset();
+        self.dynamics.reset(&self.tree, &self.pose);
         self.contacts.reset();
         (self.mass, self.friction) = (1.0, 1.0);
     }
 
     pub fn vary(&mut self, mass: f32, friction: f32) {
         (self.mass, self.friction) = (mass, friction);
+        self.dynamics.survey(&self.tree, &self.pose, mass);
     }
 
     pub fn push(&mut self, node: usize, impulse: Vector3<f32>) {
@@ -84,7 +82,7 @@ impl Articulated {
             for _ in 0..substeps {
                 self.substep(dt, contacts);
             }
-            if !self.pose.velocity.iter().all(|v| v.is_finite()) {
+            if !self.pose.velocity.iter().all(|v| v.is_finite().all()) {
                 return Err(Diverged);
             }
         }
@@ -92,22 +90,24 @@ impl Articulated {
     }
 
     pub fn read(&self, states: &mut [LinkState]) {
-        self.pose.read(&self.tree, states);
+        self.pose.read(&self.dynamics.motions, states);
     }
 
     fn substep(&mut self, dt: f32, contacts: &mut [bool]) {
-        let (tree, pose) = (&self.tree, &mut self.pose);
-        self.before.copy_from_slice(&pose.velocity);
-        self.dynamics
-            .accelerate(tree, pose, &self.targets, (dt, self.mass));
-        self.contacts
-            .resolve(tree, pose, &self.dynamics, (dt, self.friction), contacts);
-        let changes = pose
-            .velocity
-            .iter()
-            .zip(&self.before)
-            .map(|(after, before)| after - before);
-        self.dynamics.saturate(tree, changes, dt);
+        let Articulated {
+            tree,
+            pose,
+            dynamics,
+            ..
+        } = self;
+        let mut outside = dynamics.accelerate(tree, pose, &self.targets, dt);
+        outside += self
+            .contacts
+            .resolve(tree, pose, dynamics, (dt, self.friction), contacts);
+        let momentum = dynamics.momentum_after(&outside);
+        dynamics.finish(tree, pose, dt);
         pose.advance(tree, dt);
+        dynamics.survey(tree, pose, self.mass);
+        dynamics.conserve(pose, &momentum);
     }
 }

@@ -1,37 +1,66 @@
 //! Coordinates of a tree, and where they put it.
 
 use super::super::world::LinkState;
-use super::spatial::Motion;
-use super::tree::{Joint, Tree};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use super::spatial::{Axes, Motion};
+use super::tree::{Joint, Node, Tree};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use wide::f32x4;
+
+/// Where a node is in the world, seen from the root's origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub rotation: UnitQuaternion<f32>,
+    pub matrix: Matrix3<f32>,
+    pub origin: Vector3<f32>,
+    /// Where its joint turns.
+    pub pivot: Vector3<f32>,
+}
+
+impl Place {
+    pub fn point(&self, local: &Vector3<f32>) -> Vector3<f32> {
+        self.origin + self.matrix * local
+    }
+}
 
 /// Where a tree is and how it moves.
 #[derive(Clone, Debug)]
 pub(super) struct Pose {
-    /// The root's place in the world. All else is relative to it, so that nothing is lost far from the origin.
+    /// The root's place in the world. All else is relative to it, so that nothing is lost far from the world's origin.
     pub origin: Vector3<f32>,
     /// Of every node, in its parent; the root's in the world.
     pub turns: Vec<UnitQuaternion<f32>>,
     /// Of the hinges, radians.
     pub angles: Vec<f32>,
-    /// In every velocity coordinate.
-    pub velocity: Vec<f32>,
-    /// World from node, with the root at zero.
-    pub nodes: Vec<Isometry3<f32>>,
-    /// What a unit of every velocity coordinate does, about the root's origin.
-    pub axes: Vec<Motion>,
+    /// By block.
+    pub velocity: Vec<f32x4>,
+    pub places: Vec<Place>,
+    /// What a unit of every velocity coordinate does, by block, about the root's origin.
+    pub axes: Vec<Axes>,
 }
 
 impl Pose {
     pub fn new(tree: &Tree) -> Self {
-        let nodes = tree.nodes.len();
+        let nowhere = Place {
+            rotation: UnitQuaternion::identity(),
+            matrix: Matrix3::identity(),
+            origin: Vector3::zeros(),
+            pivot: Vector3::zeros(),
+        };
+        let mut axes = vec![Axes::default(); tree.blocks()];
+        let unit = |k: usize| {
+            f32x4::from(std::array::from_fn(
+                |lane| if lane == k { 1.0 } else { 0.0 },
+            ))
+        };
+        axes[0].linear = [unit(0), unit(1), unit(2)];
+        axes[1].angular = [unit(0), unit(1), unit(2)];
         Pose {
             origin: Vector3::zeros(),
-            turns: vec![UnitQuaternion::identity(); nodes],
-            angles: vec![0.0; nodes],
-            velocity: vec![0.0; tree.dofs()],
-            nodes: vec![Isometry3::identity(); nodes],
-            axes: vec![Motion::default(); tree.dofs()],
+            turns: vec![UnitQuaternion::identity(); tree.nodes.len()],
+            angles: vec![0.0; tree.nodes.len()],
+            velocity: vec![f32x4::ZERO; tree.blocks()],
+            places: vec![nowhere; tree.nodes.len()],
+            axes,
         }
     }
 
@@ -39,12 +68,11 @@ impl Pose {
     pub fn set(&mut self, tree: &Tree, states: &[LinkState]) {
         for (i, node) in tree.nodes.iter().enumerate() {
             let state = &states[i];
-            let velocity = &mut self.velocity[node.dofs.clone()];
             let Some(parent) = node.parent.map(|p| &states[p]) else {
                 self.origin = state.pose.translation.vector;
                 self.turns[i] = state.pose.rotation;
-                velocity[..3].copy_from_slice(state.linear.as_slice());
-                velocity[3..].copy_from_slice(state.angular.as_slice());
+                self.velocity[0] = four(&state.linear);
+                self.velocity[1] = four(&state.angular);
                 continue;
             };
             let turn = node.rest.inverse() * parent.pose.rotation.inverse() * state.pose.rotation;
@@ -53,101 +81,96 @@ impl Pose {
             match node.joint {
                 Joint::Hinge(axis, _) => {
                     self.angles[i] = twist(&turn, &axis);
-                    velocity[0] = rate.dot(&axis);
+                    self.velocity[node.block] = f32x4::from([rate.dot(&axis), 0.0, 0.0, 0.0]);
                 }
                 _ => {
                     self.turns[i] = turn;
-                    velocity.copy_from_slice(rate.as_slice());
+                    self.velocity[node.block] = four(&rate);
                 }
             }
         }
         self.place(tree);
-    }
-
-    /// Node poses and axes from the coordinates.
-    pub fn place(&mut self, tree: &Tree) {
-        for (i, node) in tree.nodes.iter().enumerate() {
-            let Some(parent) = node.parent.map(|p| self.nodes[p]) else {
-                self.nodes[i] = Isometry3::from_parts(Translation3::identity(), self.turns[i]);
-                self.axes[..6].copy_from_slice(&free_axes());
-                continue;
-            };
-            if let Joint::Hinge(axis, _) = node.joint {
-                let half = self.angles[i] * 0.5;
-                let part = axis * half.sin();
-                let turn = nalgebra::Quaternion::new(half.cos(), part.x, part.y, part.z);
-                self.turns[i] = UnitQuaternion::new_unchecked(turn);
-            }
-            let rotation = parent.rotation * node.rest * self.turns[i];
-            let pivot = parent.translation.vector + parent.rotation * node.pivot;
-            let place = pivot - rotation * node.anchor;
-            self.nodes[i] = Isometry3::from_parts(Translation3::from(place), rotation);
-            let axes = &mut self.axes[node.dofs.clone()];
-            match node.joint {
-                Joint::Hinge(axis, _) => axes[0] = Motion::about(rotation * axis, pivot),
-                _ => {
-                    let turned = rotation.to_rotation_matrix();
-                    for (k, axis) in axes.iter_mut().enumerate() {
-                        *axis = Motion::about(turned.matrix().column(k).into(), pivot);
-                    }
-                }
-            }
-        }
     }
 
     /// Moves the coordinates on at their velocity for `dt` seconds.
     pub fn advance(&mut self, tree: &Tree, dt: f32) {
         for (i, node) in tree.nodes.iter().enumerate() {
-            let rates = &self.velocity[node.dofs.clone()];
+            let rate = three(self.velocity[node.block]) * dt;
             match node.joint {
                 Joint::Free => {
-                    self.origin += Vector3::from_column_slice(&rates[..3]) * dt;
-                    let turn = turned(&rates[3..], dt) * self.turns[i];
-                    self.turns[i] = normalized(turn);
+                    self.origin += three(self.velocity[0]) * dt;
+                    self.turns[i] = normalized(turned(rate) * self.turns[i]);
                 }
-                Joint::Ball => self.turns[i] = normalized(self.turns[i] * turned(rates, dt)),
-                Joint::Hinge(..) => self.angles[i] += rates[0] * dt,
+                Joint::Ball => self.turns[i] = normalized(self.turns[i] * turned(rate)),
+                Joint::Hinge(..) => self.angles[i] += rate.x,
             }
         }
         self.place(tree);
     }
 
-    /// States of all nodes in the world.
-    pub fn read(&self, tree: &Tree, states: &mut [LinkState]) {
+    /// Places and axes from the coordinates.
+    fn place(&mut self, tree: &Tree) {
         for (i, node) in tree.nodes.iter().enumerate() {
-            let above = node.parent.map_or_else(Motion::default, |p| Motion {
-                angular: states[p].angular,
-                linear: states[p].linear
-                    - states[p].angular.cross(&self.nodes[p].translation.vector),
-            });
-            let motion = above + self.own_motion(node.dofs.clone());
-            let mut pose = self.nodes[i];
-            let linear = motion.at(&pose.translation.vector);
-            pose.translation.vector += self.origin;
-            states[i] = LinkState {
-                pose,
-                linear,
-                angular: motion.angular,
+            let Some(parent) = node.parent.map(|p| self.places[p]) else {
+                self.places[i].rotation = self.turns[i];
+                self.places[i].matrix = self.turns[i].to_rotation_matrix().into_inner();
+                continue;
+            };
+            if let Joint::Hinge(axis, _) = node.joint {
+                let (sin, cos) = (self.angles[i] * 0.5).sin_cos();
+                let turn = Quaternion::from_parts(cos, axis * sin);
+                self.turns[i] = UnitQuaternion::new_unchecked(turn);
+            }
+            let rotation = parent.rotation * node.rest * self.turns[i];
+            let matrix = rotation.to_rotation_matrix().into_inner();
+            let pivot = parent.point(&node.pivot);
+            let origin = pivot - matrix * node.anchor;
+            self.places[i] = Place {
+                rotation,
+                matrix,
+                origin,
+                pivot,
+            };
+            self.axes[node.block] = match node.joint {
+                Joint::Hinge(axis, _) => Axes::about(&[matrix * axis], &pivot),
+                _ => Axes::about(&[0, 1, 2].map(|k| matrix.column(k).into()), &pivot),
             };
         }
     }
 
-    /// What the velocities of `dofs` do together.
-    pub fn own_motion(&self, dofs: std::ops::Range<usize>) -> Motion {
-        let parts = self.axes[dofs.clone()].iter().zip(&self.velocity[dofs]);
-        parts.fold(Motion::default(), |sum, (axis, rate)| sum + *axis * *rate)
+    /// States of all nodes in the world.
+    pub fn read(&self, motions: &[Motion], states: &mut [LinkState]) {
+        for ((state, place), motion) in states.iter_mut().zip(&self.places).zip(motions) {
+            state.pose.rotation = place.rotation;
+            state.pose.translation.vector = place.origin + self.origin;
+            state.linear = motion.at(&place.origin);
+            state.angular = motion.angular;
+        }
+    }
+
+    /// What a node's joint does by itself.
+    pub fn own_motion(&self, i: usize, node: &Node) -> Motion {
+        let (place, rate) = (&self.places[i], self.velocity[node.block]);
+        match node.joint {
+            Joint::Free => Motion {
+                angular: three(rate),
+                linear: three(self.velocity[0]),
+            },
+            Joint::Ball => Motion::about(place.matrix * three(rate), &place.pivot),
+            Joint::Hinge(axis, _) => {
+                Motion::about(place.matrix * (axis * rate.as_array()[0]), &place.pivot)
+            }
+        }
     }
 }
 
-fn free_axes() -> [Motion; 6] {
-    std::array::from_fn(|k| {
-        let along = Vector3::from_fn(|axis, _| if axis == k % 3 { 1.0 } else { 0.0 });
-        let (linear, angular) = match k {
-            0..3 => (along, Vector3::zeros()),
-            _ => (Vector3::zeros(), along),
-        };
-        Motion { angular, linear }
-    })
+pub(super) fn four(v: &Vector3<f32>) -> f32x4 {
+    f32x4::from([v.x, v.y, v.z, 0.0])
+}
+
+pub(super) fn three(v: f32x4) -> Vector3<f32> {
+    let [x, y, z, _] = v.to_array();
+    Vector3::new(x, y, z)
 }
 
 /// Angle of a rotation about an axis, in (-π, π].
@@ -157,8 +180,8 @@ fn twist(turn: &UnitQuaternion<f32>, axis: &Vector3<f32>) -> f32 {
     2.0 * (part * sign).atan2(turn.w * sign)
 }
 
-fn turned(rates: &[f32], dt: f32) -> UnitQuaternion<f32> {
-    UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(rates) * dt)
+fn turned(by: Vector3<f32>) -> UnitQuaternion<f32> {
+    UnitQuaternion::from_scaled_axis(by)
 }
 
 fn normalized(turn: UnitQuaternion<f32>) -> UnitQuaternion<f32> {

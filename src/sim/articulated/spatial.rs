@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, AddAssign, Mul, Sub};
+use wide::f32x4;
 
 /// A velocity or an acceleration: of the turning, and of the point of the body that is at the common point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,7 +28,7 @@ pub(super) struct Inertia {
 
 impl Motion {
     /// Turning about `axis` through the point `at`.
-    pub fn about(axis: Vector3<f32>, at: Vector3<f32>) -> Self {
+    pub fn about(axis: Vector3<f32>, at: &Vector3<f32>) -> Self {
         Motion {
             angular: axis,
             linear: at.cross(&axis),
@@ -54,10 +55,52 @@ impl Motion {
             force: self.angular.cross(&carried.force),
         }
     }
+}
 
-    /// Power of a force, or a row of the inertia matrix.
-    pub fn dot(&self, force: &Force) -> f32 {
-        self.angular.dot(&force.moment) + self.linear.dot(&force.force)
+/// Motions of the coordinates of a block, component by component.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Axes {
+    pub angular: [f32x4; 3],
+    pub linear: [f32x4; 3],
+}
+
+impl Axes {
+    /// Turning about each of `axes` through the point `at`.
+    pub fn about(axes: &[Vector3<f32>], at: &Vector3<f32>) -> Self {
+        let lanes = |k: usize| {
+            let entry = |lane: usize| axes.get(lane).map_or(0.0, |axis| axis[k]);
+            f32x4::from([entry(0), entry(1), entry(2), 0.0])
+        };
+        let angular = [lanes(0), lanes(1), lanes(2)];
+        let [x, y, z] = [at.x, at.y, at.z].map(f32x4::splat);
+        let [a, b, c] = angular;
+        Axes {
+            angular,
+            linear: [y * c - z * b, z * a - x * c, x * b - y * a],
+        }
+    }
+
+    pub fn of(&self, lane: usize) -> Motion {
+        let part = |of: &[f32x4; 3]| Vector3::from_fn(|k, _| of[k].as_array()[lane]);
+        Motion {
+            angular: part(&self.angular),
+            linear: part(&self.linear),
+        }
+    }
+
+    /// Velocities of the bodies' points that are at `point`.
+    pub fn at(&self, point: &Vector3<f32>) -> [f32x4; 3] {
+        let [x, y, z] = [point.x, point.y, point.z].map(f32x4::splat);
+        let ([a, b, c], [u, v, w]) = (self.angular, self.linear);
+        [u + b * z - c * y, v + c * x - a * z, w + a * y - b * x]
+    }
+
+    /// Power of a force in each, or a block of a row of the inertia matrix.
+    pub fn dot(&self, force: &Force) -> f32x4 {
+        let sum = |axes: &[f32x4; 3], v: &Vector3<f32>| {
+            axes[0] * f32x4::splat(v.x) + axes[1] * f32x4::splat(v.y) + axes[2] * f32x4::splat(v.z)
+        };
+        sum(&self.angular, &force.moment) + sum(&self.linear, &force.force)
     }
 }
 
@@ -81,6 +124,46 @@ impl Inertia {
     }
 }
 
+impl Inertia {
+    pub fn mass(&self) -> f32 {
+        self.mass
+    }
+
+    pub fn com(&self) -> Vector3<f32> {
+        self.first / self.mass
+    }
+
+    /// The motion of this momentum, if the body has any extent.
+    pub fn motion_of(&self, momentum: &Force) -> Option<Motion> {
+        let com = self.com();
+        let central = Inertia::new(-self.mass, com, self.second).second;
+        let spin = momentum.moment - com.cross(&momentum.force);
+        let angular = central.try_inverse()? * spin;
+        Some(Motion {
+            angular,
+            linear: momentum.force / self.mass + com.cross(&angular),
+        })
+    }
+}
+
+impl Force {
+    /// An impulse or a force at a point.
+    pub fn at(force: Vector3<f32>, point: &Vector3<f32>) -> Self {
+        Force {
+            moment: point.cross(&force),
+            force,
+        }
+    }
+
+    /// The same about another point.
+    pub fn about(&self, point: &Vector3<f32>) -> Self {
+        Force {
+            moment: self.moment - point.cross(&self.force),
+            force: self.force,
+        }
+    }
+}
+
 impl Add for Motion {
     type Output = Self;
     fn add(self, other: Self) -> Self {
@@ -91,22 +174,22 @@ impl Add for Motion {
     }
 }
 
-impl Mul<f32> for Motion {
-    type Output = Self;
-    fn mul(self, factor: f32) -> Self {
-        Motion {
-            angular: self.angular * factor,
-            linear: self.linear * factor,
-        }
-    }
-}
-
 impl Add for Force {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Force {
             moment: self.moment + other.moment,
             force: self.force + other.force,
+        }
+    }
+}
+
+impl Mul<f32> for Force {
+    type Output = Self;
+    fn mul(self, factor: f32) -> Self {
+        Force {
+            moment: self.moment * factor,
+            force: self.force * factor,
         }
     }
 }

@@ -1,18 +1,21 @@
 //! What doesn't change while a character moves: its joints, their order, and which of them carry which.
+//!
+//! Velocity coordinates lie in blocks of four, of which a joint uses three or one (the root two blocks, three of
+//! each): so every sum over the coordinates that move a node runs four at a time.
 
 use super::super::character::{Character, Link, LinkJoint};
 use crate::skeleton::{Drive, Shape};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use std::ops::Range;
+use wide::f32x4;
 
 /// How a node turns in its parent.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joint {
-    /// Three coordinates along the world's axes, then three about them.
+    /// A block along the world's axes, and one about them.
     Free,
-    /// Three coordinates about the node's own axes.
+    /// About the node's own axes.
     Ball,
-    /// One, about a unit axis in the node's frame; between the ends of its range, if it has one.
+    /// About a unit axis in the node's frame; between the ends of its range, if it has one.
     Hinge(Vector3<f32>, Option<[f32; 2]>),
 }
 
@@ -26,9 +29,9 @@ pub(super) struct Node {
     /// Where the joint turns, in the parent's frame and in the link's.
     pub pivot: Vector3<f32>,
     pub anchor: Vector3<f32>,
-    /// Its velocity coordinates.
-    pub dofs: Range<usize>,
-    /// Coordinates that move it, from the root's to its own.
+    /// Its coordinates' block; the root's second.
+    pub block: usize,
+    /// Blocks that move it, from the root's to its own.
     pub path: Vec<usize>,
     pub mass: f32,
     pub com: Vector3<f32>,
@@ -39,21 +42,23 @@ pub(super) struct Node {
     pub points: Vec<(Vector3<f32>, f32)>,
 }
 
-/// Gains of one velocity coordinate; zero where nothing drives it.
+/// Gains of a block; zero where nothing drives a coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gains {
-    pub kp: f32,
-    pub kd: f32,
-    pub limit: f32,
+    pub kp: f32x4,
+    pub kd: f32x4,
+    pub limit: f32x4,
 }
 
 /// The nodes, parents before children.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     pub nodes: Vec<Node>,
-    /// One for each velocity coordinate.
+    /// One for each block.
     pub gains: Vec<Gains>,
-    /// `[nodes, nodes]`: how many coordinates move both.
+    /// Coordinates in use in each block: the first ones.
+    pub used: Vec<usize>,
+    /// `[nodes, nodes]`: how many blocks move both.
     shared: Vec<usize>,
 }
 
@@ -62,17 +67,11 @@ impl Tree {
         let mut tree = Tree {
             nodes: Vec::new(),
             gains: Vec::new(),
+            used: Vec::new(),
             shared: Vec::new(),
         };
         for link in &character.links {
-            let first = tree.gains.len();
-            tree.gains.extend(gains(&link.joint));
-            let dofs = first..tree.gains.len();
-            let mut path = link
-                .parent
-                .map_or_else(Vec::new, |p| tree.nodes[p].path.clone());
-            path.extend(dofs.clone());
-            tree.nodes.push(node(link, dofs, path));
+            tree.add(link);
         }
         for a in &tree.nodes {
             let both = |b: &Node| {
@@ -87,18 +86,36 @@ impl Tree {
         tree
     }
 
-    /// How many coordinates move both nodes: the first ones of either's path.
+    fn add(&mut self, link: &Link) {
+        let first = self.gains.len();
+        if let LinkJoint::Free = link.joint {
+            self.gains.push(Gains::default());
+            self.used.push(3);
+        }
+        self.gains.push(gains(&link.joint));
+        self.used.push(if let LinkJoint::Hinge { .. } = link.joint {
+            1
+        } else {
+            3
+        });
+        let mut path = link
+            .parent
+            .map_or_else(Vec::new, |p| self.nodes[p].path.clone());
+        path.extend(first..self.gains.len());
+        self.nodes.push(node(link, path));
+    }
+
+    /// How many blocks move both nodes: the first ones of either's path.
     pub fn shared(&self, a: usize, b: usize) -> usize {
         self.shared[a * self.nodes.len() + b]
     }
 
-    /// Number of velocity coordinates.
-    pub fn dofs(&self) -> usize {
+    pub fn blocks(&self) -> usize {
         self.gains.len()
     }
 }
 
-fn node(link: &Link, dofs: Range<usize>, path: Vec<usize>) -> Node {
+fn node(link: &Link, path: Vec<usize>) -> Node {
     Node {
         parent: link.parent,
         joint: joint(&link.joint),
@@ -107,7 +124,7 @@ fn node(link: &Link, dofs: Range<usize>, path: Vec<usize>) -> Node {
             .coords
             .cast(),
         anchor: link.anchor.cast(),
-        dofs,
+        block: path[path.len() - 1],
         path,
         mass: link.mass as f32,
         com: link.com.cast(),
@@ -128,18 +145,20 @@ fn joint(joint: &LinkJoint) -> Joint {
     }
 }
 
-fn gains(joint: &LinkJoint) -> Vec<Gains> {
-    let one = |drive: &Drive| Gains {
-        kp: drive.kp as f32,
-        kd: drive.kd as f32,
-        limit: drive.force_limit.min(f64::from(f32::MAX)) as f32,
+fn gains(joint: &LinkJoint) -> Gains {
+    let drives: &[Drive] = match joint {
+        LinkJoint::Free => &[],
+        LinkJoint::Hinge { drive, .. } => std::slice::from_ref(drive),
+        LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => drives,
     };
-    match joint {
-        LinkJoint::Free => vec![Gains::default(); 6],
-        LinkJoint::Hinge { drive, .. } => vec![one(drive)],
-        LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => {
-            drives.iter().map(one).collect()
-        }
+    let each = |of: fn(&Drive) -> f64| {
+        let value = |k: usize| drives.get(k).map_or(0.0, of).min(f64::from(f32::MAX)) as f32;
+        f32x4::from([value(0), value(1), value(2), 0.0])
+    };
+    Gains {
+        kp: each(|drive| drive.kp),
+        kd: each(|drive| drive.kd),
+        limit: each(|drive| drive.force_limit),
     }
 }
 

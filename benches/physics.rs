@@ -1,0 +1,107 @@
+//! Physics steps a second of one core: both engines, the same character doing the same, in turn.
+//!
+//! `cargo bench -p mimic --bench physics [SKELETON]`; `benches/mujoco_physics.py` measures MuJoCo at the same.
+
+use mimic::sim::{Character, Engine, LinkJoint, LinkState, Settings, Target, World};
+use mimic::skeleton::Skeleton;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use std::time::Instant;
+
+const ROUNDS: usize = 7;
+
+fn main() {
+    let named = std::env::args().skip(1).find(|a| !a.starts_with('-'));
+    let name = named.unwrap_or_else(|| "humanoid".to_owned());
+    let skeleton = Skeleton::load(&name).expect("a skeleton by name or file");
+    let character = Character::new(&skeleton).expect("it can be simulated");
+    let mut rest = skeleton.rest_qpos();
+    rest[2] -= skeleton.lowest_point(&skeleton.forward(&rest));
+    let start = standing(&skeleton, &character, &rest);
+    println!("{name}: thousands of physics steps a second, median of {ROUNDS}");
+    for (what, lift, swing) in [
+        ("stands", 0.0, 0.0),
+        ("flails on the ground", 0.0, 1.0),
+        ("flails in the air", 50.0, 1.0),
+    ] {
+        let mut rates = [const { Vec::new() }; 2];
+        for _ in 0..ROUNDS {
+            for (engine, rates) in [Engine::Articulated, Engine::Rapier]
+                .into_iter()
+                .zip(&mut rates)
+            {
+                rates.push(rate(&character, &start, engine, (lift, swing)));
+            }
+        }
+        let [own, rapier] = rates.map(|mut rates| {
+            rates.sort_by(f64::total_cmp);
+            rates[rates.len() / 2]
+        });
+        println!(
+            "{what:>22}: articulated {own:6.1}, rapier {rapier:6.1}, ratio {:.2}",
+            own / rapier
+        );
+    }
+}
+
+fn rate(
+    character: &Character,
+    start: &[LinkState],
+    engine: Engine,
+    (lift, swing): (f32, f32),
+) -> f64 {
+    let settings = Settings {
+        engine,
+        ..Settings::default()
+    };
+    let mut world = World::new(character, settings);
+    let mut start = start.to_vec();
+    for state in &mut start {
+        state.pose.translation.z += lift;
+    }
+    let (seconds, episodes) = (60, 10);
+    let began = Instant::now();
+    for _ in 0..episodes {
+        world.reset(&start);
+        for step in 0..seconds {
+            world.set_targets(&targets(character, step, swing));
+            world.step().expect("it stays finite");
+        }
+    }
+    let steps =
+        f64::from(settings.steps_per_control * settings.substeps) * (seconds * episodes) as f64;
+    steps / began.elapsed().as_secs_f64() / 1e3
+}
+
+/// Every joint a sine of its own, as wide as `swing`.
+fn targets(character: &Character, step: usize, swing: f32) -> Vec<Target> {
+    let at = |i: usize| swing * (step as f32 * 0.35 + i as f32).sin();
+    let turn = |i| {
+        UnitQuaternion::from_scaled_axis(Vector3::new(
+            0.5 * at(i),
+            0.8 * at(i + 3),
+            0.3 * at(i + 5),
+        ))
+    };
+    let links = character.links.iter().enumerate();
+    links
+        .map(|(i, link)| match link.joint {
+            LinkJoint::Free => Target::Free,
+            LinkJoint::Hinge { .. } => Target::Hinge(0.8 * swing + 0.6 * at(i)),
+            LinkJoint::Ball { .. } | LinkJoint::Hinges { .. } => Target::Ball(turn(i)),
+        })
+        .collect()
+}
+
+fn standing(skeleton: &Skeleton, character: &Character, rest: &[f64]) -> Vec<LinkState> {
+    let poses: Vec<Isometry3<f64>> = skeleton.forward(rest);
+    let still = |body: usize| LinkState {
+        pose: poses[body].cast(),
+        linear: Vector3::zeros(),
+        angular: Vector3::zeros(),
+    };
+    character
+        .links
+        .iter()
+        .map(|link| still(link.body))
+        .collect()
+}
