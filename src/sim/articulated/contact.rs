@@ -108,20 +108,26 @@ impl Contacts {
         self.points.clear();
         let mut id = 0;
         for (i, node) in tree.nodes.iter().enumerate() {
-            let place = &pose.places[i];
+            let (place, motion) = (&pose.places[i], &motions[i]);
+            let fastest = motion.angular.norm() * node.reach - motion.at(&place.origin).z;
+            let lowest = place.origin.z + pose.origin.z - node.reach;
+            if lowest - dt * fastest.max(0.0) > NEAR {
+                id += node.points.len();
+                continue;
+            }
             let friction = friction * node.friction;
             let first = self.points.len();
             for (point, radius) in &node.points {
                 let mut arm = place.matrix * point;
                 arm.z -= radius;
                 let gap = arm.z + place.origin.z + pose.origin.z;
-                if gap < NEAR || gap + dt * motions[i].at(&(place.origin + arm)).z < NEAR {
+                if gap < NEAR || gap + dt * motion.at(&(place.origin + arm)).z < NEAR {
                     self.touch(arm, wanted(gap / dt), friction, id);
                 }
                 id += 1;
             }
             if self.points.len() > first {
-                self.touchers.push(toucher(i, place, &motions[i]));
+                self.touchers.push(toucher(i, place, motion));
             }
         }
     }
@@ -305,9 +311,12 @@ fn toucher(node: usize, place: &Place, motion: &Motion) -> Toucher {
     }
 }
 
-fn twist(sums: [f32x4; 6]) -> Twist {
-    let [a, b, c, x, y, z] = sums.map(f32x4::reduce_add);
-    [f32x4::from([a, b, c, 0.0]), f32x4::from([x, y, z, 0.0])]
+/// Sums of the lanes of each.
+fn twist([a, b, c, x, y, z]: [f32x4; 6]) -> Twist {
+    [[a, b, c, f32x4::ZERO], [x, y, z, f32x4::ZERO]].map(|rows| {
+        let [p, q, r, s] = f32x4::transpose(rows);
+        p + q + r + s
+    })
 }
 
 fn wrench(arm: &Vector3<f32>, impulse: &Vector3<f32>) -> [f32; 6] {

@@ -1,7 +1,7 @@
 //! Velocities, momentum, and accelerations without contacts: inertia, gravity, what turns with what, and the drives.
 
 use super::matrix::PathMatrix;
-use super::pose::{Pose, four};
+use super::pose::{Pose, four, rotation_vector};
 use super::spatial::{Force, Inertia, Motion};
 use super::tree::{Joint, Tree};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -14,8 +14,9 @@ const STOP: f32 = 4.0;
 /// What a step computes of a tree before it looks at the ground.
 #[derive(Clone, Debug)]
 pub(super) struct Dynamics {
-    /// Of every node, in its present pose.
+    /// Of every node, in its present pose; and what its own joint adds to that.
     pub motions: Vec<Motion>,
+    own: Vec<Motion>,
     inertias: Vec<Inertia>,
     whole: Inertia,
     /// What the whole character has, about the root's origin.
@@ -43,6 +44,7 @@ impl Dynamics {
         let (nodes, blocks) = (tree.nodes.len(), tree.blocks());
         Dynamics {
             motions: vec![Motion::default(); nodes],
+            own: vec![Motion::default(); nodes],
             inertias: vec![Inertia::default(); nodes],
             whole: Inertia::default(),
             momentum: Force::default(),
@@ -80,6 +82,7 @@ impl Dynamics {
             let central = place.matrix * (node.inertia * mass) * place.matrix.transpose();
             let inertia = Inertia::new(node.mass * mass, place.point(&node.com), central);
             self.motions[i] = node.parent.map_or(own, |p| self.motions[p] + own);
+            self.own[i] = own;
             self.momentum += inertia.times(&self.motions[i]);
             self.whole += inertia;
             self.inertias[i] = inertia;
@@ -116,7 +119,7 @@ impl Dynamics {
     ) -> Force {
         let weight = Vector3::new(0.0, 0.0, -GRAVITY * self.whole.mass());
         let mut impulse = Force::at(weight * dt, &self.whole.com());
-        self.sweep_out(tree, pose);
+        self.sweep_out(tree);
         for (node, push) in self.pushes.drain(..) {
             let push = Force::at(push, &pose.places[node].point(&tree.nodes[node].com));
             impulse += push;
@@ -145,7 +148,7 @@ impl Dynamics {
 
     /// From the root outwards: accelerations that no coordinate has a part in, and the forces they take (recursive
     /// Newton-Euler, RBDA table 5.1).
-    fn sweep_out(&mut self, tree: &Tree, pose: &Pose) {
+    fn sweep_out(&mut self, tree: &Tree) {
         for (i, node) in tree.nodes.iter().enumerate() {
             let motion = self.motions[i];
             let acceleration = match node.parent {
@@ -154,7 +157,7 @@ impl Dynamics {
                     angular: Vector3::zeros(),
                     linear: motion.linear.cross(&motion.angular) + Vector3::new(0.0, 0.0, GRAVITY),
                 },
-                Some(p) => self.accelerations[p] + motion.cross(&pose.own_motion(i, node)),
+                Some(p) => self.accelerations[p] + motion.cross(&self.own[i]),
             };
             let momentum = self.inertias[i].times(&motion);
             self.forces[i] = self.inertias[i].times(&acceleration) + motion.cross_force(&momentum);
@@ -171,12 +174,9 @@ impl Dynamics {
             let first = if node.parent.is_none() { 0 } else { node.block };
             for block in first..=node.block {
                 self.change[block] = pose.axes[block].dot(&force) * f32x4::splat(-dt);
-                for lane in 0..tree.used[block] {
-                    let momentum = inertia.times(&pose.axes[block].of(lane));
-                    let row = self.matrix.row_mut(block, lane);
-                    for (entry, &other) in row.iter_mut().zip(&node.path) {
-                        *entry = pose.axes[other].dot(&momentum);
-                    }
+                let momenta = inertia.momenta(&pose.axes[block]);
+                for (rows, &other) in self.matrix.rows_mut(block).iter_mut().zip(&node.path) {
+                    *rows = pose.axes[other].powers(&momenta);
                 }
             }
             if let Some(parent) = node.parent {
@@ -193,7 +193,7 @@ impl Dynamics {
         for (i, node) in tree.nodes.iter().enumerate() {
             let error = match node.joint {
                 Joint::Free => continue,
-                Joint::Ball => (targets[i].inverse() * pose.turns[i]).scaled_axis(),
+                Joint::Ball => rotation_vector(&(targets[i].inverse() * pose.turns[i])),
                 Joint::Hinge(..) => Vector3::new(pose.angles[i] - targets[i].w, 0.0, 0.0),
             };
             let (k, gains) = (node.block, &tree.gains[node.block]);

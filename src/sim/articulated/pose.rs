@@ -180,6 +180,17 @@ fn twist(turn: &UnitQuaternion<f32>, axis: &Vector3<f32>) -> f32 {
     2.0 * (part * sign).atan2(turn.w * sign)
 }
 
+/// Axis times angle, at most π long.
+pub(super) fn rotation_vector(turn: &UnitQuaternion<f32>) -> Vector3<f32> {
+    let sign = if turn.w < 0.0 { -1.0 } else { 1.0 };
+    let part = turn.imag() * sign;
+    let length = part.norm();
+    if length < 1e-6 {
+        return part * 2.0;
+    }
+    part * (2.0 * length.atan2(turn.w * sign) / length)
+}
+
 fn turned(by: Vector3<f32>) -> UnitQuaternion<f32> {
     UnitQuaternion::from_scaled_axis(by)
 }

@@ -80,14 +80,6 @@ impl Axes {
         }
     }
 
-    pub fn of(&self, lane: usize) -> Motion {
-        let part = |of: &[f32x4; 3]| Vector3::from_fn(|k, _| of[k].as_array()[lane]);
-        Motion {
-            angular: part(&self.angular),
-            linear: part(&self.linear),
-        }
-    }
-
     /// Velocities of the bodies' points that are at `point`.
     pub fn at(&self, point: &Vector3<f32>) -> [f32x4; 3] {
         let [x, y, z] = [point.x, point.y, point.z].map(f32x4::splat);
@@ -95,7 +87,14 @@ impl Axes {
         [u + b * z - c * y, v + c * x - a * z, w + a * y - b * x]
     }
 
-    /// Power of a force in each, or a block of a row of the inertia matrix.
+    /// Power of forces, component by component, of which each counts in one row: `[lane]` of the result are the powers
+    /// of force `lane` in every one of the axes. Three rows of a block of the inertia matrix.
+    pub fn powers(&self, forces: &[[f32x4; 6]; 3]) -> [f32x4; 3] {
+        let ([a, b, c], [u, v, w]) = (self.angular, self.linear);
+        forces.map(|[l, m, n, x, y, z]| a * l + b * m + c * n + u * x + v * y + w * z)
+    }
+
+    /// Power of a force in each.
     pub fn dot(&self, force: &Force) -> f32x4 {
         let sum = |axes: &[f32x4; 3], v: &Vector3<f32>| {
             axes[0] * f32x4::splat(v.x) + axes[1] * f32x4::splat(v.y) + axes[2] * f32x4::splat(v.z)
@@ -125,6 +124,26 @@ impl Inertia {
 }
 
 impl Inertia {
+    /// Momenta of axes, each component spread over all lanes: `[axis, component]`.
+    pub fn momenta(&self, axes: &Axes) -> [[f32x4; 6]; 3] {
+        let ([a, b, c], [u, v, w]) = (axes.angular, axes.linear);
+        let [x, y, z] = [self.first.x, self.first.y, self.first.z].map(f32x4::splat);
+        let row = |i: usize| {
+            let part = |j: usize| f32x4::splat(self.second[(i, j)]);
+            part(0) * a + part(1) * b + part(2) * c
+        };
+        let mass = f32x4::splat(self.mass);
+        let components = [
+            row(0) + y * w - z * v,
+            row(1) + z * u - x * w,
+            row(2) + x * v - y * u,
+            mass * u + b * z - c * y,
+            mass * v + c * x - a * z,
+            mass * w + a * y - b * x,
+        ];
+        [0, 1, 2].map(|lane| components.map(|c| f32x4::splat(c.as_array()[lane])))
+    }
+
     pub fn mass(&self) -> f32 {
         self.mass
     }

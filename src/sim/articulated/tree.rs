@@ -40,6 +40,8 @@ pub(super) struct Node {
     pub friction: f32,
     /// Points that can touch the ground, in the link's frame, each with a radius.
     pub points: Vec<(Vector3<f32>, f32)>,
+    /// None of them is farther from the link's origin, metres.
+    pub reach: f32,
 }
 
 /// Gains of a block; zero where nothing drives a coordinate.
@@ -116,7 +118,10 @@ impl Tree {
 }
 
 fn node(link: &Link, path: Vec<usize>) -> Node {
+    let points: Vec<_> = link.shapes.iter().flat_map(points).collect();
+    let reaches = points.iter().map(|(at, radius)| at.norm() + radius);
     Node {
+        reach: reaches.fold(0.0, f32::max),
         parent: link.parent,
         joint: joint(&link.joint),
         rest: link.rest.rotation.cast(),
@@ -130,7 +135,7 @@ fn node(link: &Link, path: Vec<usize>) -> Node {
         com: link.com.cast(),
         inertia: link.inertia.cast(),
         friction: link.friction as f32,
-        points: link.shapes.iter().flat_map(points).collect(),
+        points,
     }
 }
 
