@@ -1,16 +1,16 @@
-//! Simulates a character whose drives hold its rest pose, for `tests/outside/mujoco_simulation.py` to do the same.
+//! Simulates a character whose drives hold a pose, for `tests/outside/mujoco_simulation.py` to do the same.
 //!
-//! `cargo run --release --example simulation_trace START.json SKELETON HZ > TRACE.json`, where START holds `qpos`, `qvel` and
-//! `steps` of 1/30 s, and HZ is the rate of physics. Prints positions of all bodies after every step.
+//! `cargo run --release --example simulation_trace START.json SKELETON HZ CONTACT_S > TRACE.json`, where START holds `qpos`, `qvel`,
+//! `control` and `steps` of 1/30 s, HZ is the rate of physics and CONTACT_S the seconds in which the ground yields. Prints positions of all bodies after every step.
 
-use mimic::sim::{Character, LinkJoint, LinkState, Settings, Target, World};
+use mimic::sim::{Character, Link, LinkJoint, LinkState, Settings, Target, World};
 use mimic::skeleton::Skeleton;
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let usage = "usage: simulation_trace START.json SKELETON HZ";
+    let usage = "usage: simulation_trace START.json SKELETON HZ CONTACT_S";
     let mut args = std::env::args().skip(1);
     let mut next = || args.next().ok_or(usage);
     let start: Value = serde_json::from_str(&std::fs::read_to_string(next()?)?)?;
@@ -18,12 +18,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings {
         steps_per_control: (next()?.parse::<f64>()? / 30.0).round() as u32,
         substeps: 1,
+        contact_s: next()?.parse()?,
         ..Settings::default()
     };
     let character = Character::new(&skeleton)?;
     let mut world = World::new(&character, settings);
     world.reset(&states(&skeleton, &character, &start)?);
-    world.set_targets(&rest(&character));
+    let control: Vec<f32> = serde_json::from_value(start["control"].clone())?;
+    world.set_targets(&targets(&character, &control));
     let mut trace = Vec::new();
     for _ in 0..start["steps"].as_u64().ok_or(usage)? {
         world.step()?;
@@ -53,19 +55,19 @@ fn states(
         .collect())
 }
 
-fn rest(character: &Character) -> Vec<Target> {
-    let hold = |joint: &LinkJoint| match joint {
-        LinkJoint::Free => Target::Free,
-        LinkJoint::Hinge { .. } => Target::Hinge(0.0),
-        LinkJoint::Ball { .. } | LinkJoint::Hinges { .. } => {
-            Target::Ball(UnitQuaternion::identity())
+/// A hinge's angle, a ball's rotation vector, of all drives in their order.
+fn targets(character: &Character, control: &[f32]) -> Vec<Target> {
+    let target = |link: &Link| {
+        let own = &control[link.dof..link.dof + link.joint.dof()];
+        match link.joint {
+            LinkJoint::Free => Target::Free,
+            LinkJoint::Hinge { .. } => Target::Hinge(own[0]),
+            _ => Target::Ball(UnitQuaternion::from_scaled_axis(Vector3::new(
+                own[0], own[1], own[2],
+            ))),
         }
     };
-    character
-        .links
-        .iter()
-        .map(|link| hold(&link.joint))
-        .collect()
+    character.links.iter().map(target).collect()
 }
 
 fn positions(character: &Character, states: &[LinkState]) -> Vec<Vec<f32>> {

@@ -36,6 +36,9 @@ pub struct Settings {
     pub steps_per_control: u32,
     /// Substeps in one physics step, each of which integrates joints, drives and contacts; default 4.
     pub substeps: u32,
+    /// Seconds in which the ground yields to a foot, as the time constant of MuJoCo's `solref`, which is 0.02 there by
+    /// default; 0: the ground is hard. The rapier engine has its own.
+    pub contact_s: f64,
     /// Default [`Engine::Articulated`].
     pub engine: Engine,
 }
@@ -46,6 +49,7 @@ impl Default for Settings {
             control_hz: 30.0,
             steps_per_control: 2,
             substeps: 4,
+            contact_s: 0.0,
             engine: Engine::Articulated,
         }
     }

@@ -20,11 +20,11 @@ import numpy as np
 FINE = 5e-5
 
 
-def trace(program, skeleton, start, hz):
+def trace(program, skeleton, start, hz, contact_s=0.0):
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "start.json"
         path.write_text(json.dumps(start))
-        done = subprocess.run([program, path, skeleton, str(hz)], check=True, capture_output=True, text=True)
+        done = subprocess.run([program, path, skeleton, str(hz), str(contact_s)], check=True, capture_output=True, text=True)
     return np.array(json.loads(done.stdout))
 
 

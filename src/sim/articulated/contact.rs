@@ -17,12 +17,27 @@ const NEAR: f32 = 0.005;
 /// Share of a depth that is taken back in one step, and the fastest that it may be, m/s.
 const RECOVERY: f32 = 0.2;
 const FASTEST: f32 = 0.5;
-/// Added to a point's own response, as a share of it: of redundant points, each bears its part.
+/// Added to a hard point's own response, as a share of it: of redundant points, each bears its part.
 const SOFTNESS: f32 = 1e-3;
+/// Of soft contacts, as MuJoCo's have it: how much of its acceleration a point is given at the surface, and below this
+/// depth, metres.
+const IMPEDANCE: [f32; 2] = [0.9, 0.95];
+const SURFACE: f32 = 0.001;
 /// Most passes over all points, which start from the impulses of the step before; and the change, m/s, below which a
 /// pass is the last.
 const SWEEPS: usize = 12;
 const STILL: f32 = 1e-4;
+
+/// What the ground is to one step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ground {
+    /// Seconds of the step.
+    pub dt: f32,
+    /// Factor of everyone's friction.
+    pub friction: f32,
+    /// Seconds in which it yields; 0 where it is hard.
+    pub yielding: f32,
+}
 
 /// Twist of a body: its angular velocity, and that of its frame's origin.
 type Twist = [f32x4; 2];
@@ -41,8 +56,10 @@ struct Point {
     toucher: usize,
     /// From the body's origin.
     arm: Vector3<f32>,
-    /// Vertical velocity that it must have, if not more.
-    wanted: f32,
+    /// Velocity that it is brought to; upwards it may have more.
+    wanted: Vector3<f32>,
+    /// Added to its response, as a share of it.
+    softness: f32,
     friction: f32,
     impulse: Vector3<f32>,
     /// Its velocity for each impulse on itself.
@@ -87,10 +104,10 @@ impl Contacts {
         tree: &Tree,
         pose: &Pose,
         dynamics: &mut Dynamics,
-        (dt, friction): (f32, f32),
+        ground: &Ground,
         pressed: &mut [bool],
     ) -> Force {
-        self.find(tree, pose, &dynamics.motions, (dt, friction));
+        self.find(tree, pose, &dynamics.motions, ground);
         if self.points.is_empty() {
             self.reset();
             return Force::default();
@@ -103,7 +120,7 @@ impl Contacts {
         self.report(pose, pressed)
     }
 
-    fn find(&mut self, tree: &Tree, pose: &Pose, motions: &[Motion], (dt, friction): (f32, f32)) {
+    fn find(&mut self, tree: &Tree, pose: &Pose, motions: &[Motion], ground: &Ground) {
         self.touchers.clear();
         self.points.clear();
         let mut id = 0;
@@ -111,18 +128,19 @@ impl Contacts {
             let (place, motion) = (&pose.places[i], &motions[i]);
             let fastest = motion.angular.norm() * node.reach - motion.at(&place.origin).z;
             let lowest = place.origin.z + pose.origin.z - node.reach;
-            if lowest - dt * fastest.max(0.0) > NEAR {
+            if lowest - ground.dt * fastest.max(0.0) > NEAR {
                 id += node.points.len();
                 continue;
             }
-            let friction = friction * node.friction;
+            let friction = ground.friction * node.friction;
             let first = self.points.len();
             for (point, radius) in &node.points {
                 let mut arm = place.matrix * point;
                 arm.z -= radius;
                 let gap = arm.z + place.origin.z + pose.origin.z;
-                if gap < NEAR || gap + dt * motion.at(&(place.origin + arm)).z < NEAR {
-                    self.touch(arm, wanted(gap / dt), friction, id);
+                let velocity = motion.at(&(place.origin + arm));
+                if gap < NEAR || gap + ground.dt * velocity.z < NEAR {
+                    self.touch(arm, ground.wants(gap, velocity), friction, id);
                 }
                 id += 1;
             }
@@ -132,11 +150,18 @@ impl Contacts {
         }
     }
 
-    fn touch(&mut self, arm: Vector3<f32>, wanted: f32, friction: f32, id: usize) {
+    fn touch(
+        &mut self,
+        arm: Vector3<f32>,
+        (wanted, softness): (Vector3<f32>, f32),
+        friction: f32,
+        id: usize,
+    ) {
         self.points.push(Point {
             toucher: self.touchers.len(),
             arm,
             wanted,
+            softness,
             friction,
             impulse: self.last[id],
             response: Matrix3::zeros(),
@@ -208,7 +233,6 @@ impl Contacts {
                 let velocity = at(&answer(own, &wrench(&arm, &unit)), &arm);
                 self.points[i].response.set_column(axis, &velocity);
             }
-            self.points[i].response[(2, 2)] *= 1.0 + SOFTNESS;
             if impulse != Vector3::zeros() {
                 self.spread(toucher, &arm, &impulse);
             }
@@ -290,12 +314,13 @@ impl Point {
     fn next(&self, velocity: Vector3<f32>) -> Vector3<f32> {
         let (now, response) = (self.impulse, &self.response);
         // Softness resists the whole impulse, not only its change.
-        let lag = now.z * response[(2, 2)] * SOFTNESS;
-        let up = (now.z - (velocity.z - self.wanted + lag) / response[(2, 2)]).max(0.0);
-        let along = |k: usize| {
-            let after = velocity[k] + response[(k, 2)] * (up - now.z);
-            now[k] - after / response[(k, k)]
+        let stopping = |k: usize, velocity: f32| {
+            let own = response[(k, k)];
+            let over = velocity - self.wanted[k] + now[k] * own * self.softness;
+            now[k] - over / (own * (1.0 + self.softness))
         };
+        let up = stopping(2, velocity.z).max(0.0);
+        let along = |k: usize| stopping(k, velocity[k] + response[(k, 2)] * (up - now.z));
         let [x, y] = [along(0), along(1)];
         let (most, length) = (self.friction * up, (x * x + y * y).sqrt());
         let share = if length > most { most / length } else { 1.0 };
@@ -340,6 +365,28 @@ fn answer(coupling: &[Twist; 6], wrench: &[f32; 6]) -> Twist {
 /// Velocity at a point of a body.
 fn at(twist: &Twist, arm: &Vector3<f32>) -> Vector3<f32> {
     three(twist[1]) + three(twist[0]).cross(arm)
+}
+
+impl Ground {
+    /// Velocity that a point `gap` above the ground is brought to, and how softly.
+    fn wants(&self, gap: f32, velocity: Vector3<f32>) -> (Vector3<f32>, f32) {
+        if self.yielding <= 0.0 {
+            return (Vector3::new(0.0, 0.0, wanted(gap / self.dt)), SOFTNESS);
+        }
+        // A critically damped spring whose time constant is `yielding` (MuJoCo, "Computation", "Reference").
+        let [first, most] = IMPEDANCE;
+        let depth = (-gap).max(0.0);
+        let impedance = first + (most - first) * (depth / SURFACE).min(1.0);
+        let kept = (1.0 - 2.0 * self.dt / (most * self.yielding)).max(0.0);
+        let back = self.dt * impedance / (most * self.yielding).powi(2) * depth;
+        let mut wanted = velocity * kept;
+        wanted.z = if gap > 0.0 {
+            wanted.z.min(-gap / self.dt)
+        } else {
+            wanted.z + back
+        };
+        (wanted, (1.0 - impedance) / impedance)
+    }
 }
 
 /// Velocity that leaves no more than `room` metres a second to go, or recovers from a depth.

@@ -13,7 +13,7 @@ mod tree;
 
 use super::world::{LinkState, Target};
 use super::{Character, Diverged, Settings};
-use contact::Contacts;
+use contact::{Contacts, Ground};
 use dynamics::Dynamics;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pose::Pose;
@@ -100,10 +100,15 @@ impl Articulated {
             dynamics,
             ..
         } = self;
+        let ground = Ground {
+            dt,
+            friction: self.friction,
+            yielding: self.settings.contact_s as f32,
+        };
         let mut outside = dynamics.accelerate(tree, pose, &self.targets, dt);
         outside += self
             .contacts
-            .resolve(tree, pose, dynamics, (dt, self.friction), contacts);
+            .resolve(tree, pose, dynamics, &ground, contacts);
         let momentum = dynamics.momentum_after(&outside);
         dynamics.finish(tree, pose, dt);
         pose.advance(tree, dt);

@@ -18,8 +18,6 @@ macro_rules! on_both_engines {
     };
 }
 
-use on_both_engines;
-
 mod joints;
 
 use super::*;
