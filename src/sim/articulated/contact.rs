@@ -97,27 +97,18 @@ impl Contacts {
         self.last.fill(Vector3::zeros());
     }
 
-    /// Adds to the half solution what keeps the character out of the ground, and marks in `pressed` the nodes that
-    /// push on it. Returns the ground's impulse on the character.
-    pub fn resolve(
-        &mut self,
-        tree: &Tree,
-        pose: &Pose,
-        dynamics: &mut Dynamics,
-        ground: &Ground,
-        pressed: &mut [bool],
-    ) -> Force {
+    /// Adds to the half solution what keeps the character out of the ground.
+    pub fn resolve(&mut self, tree: &Tree, pose: &Pose, dynamics: &mut Dynamics, ground: &Ground) {
         self.find(tree, pose, &dynamics.motions, ground);
         if self.points.is_empty() {
             self.reset();
-            return Force::default();
+            return;
         }
         self.halve(tree, pose, dynamics);
         self.couple(tree);
         self.respond();
         self.solve();
         self.apply(tree, &mut dynamics.change);
-        self.report(pose, pressed)
     }
 
     fn find(&mut self, tree: &Tree, pose: &Pose, motions: &[Motion], ground: &Ground) {
@@ -298,7 +289,8 @@ impl Contacts {
         }
     }
 
-    fn report(&self, pose: &Pose, pressed: &mut [bool]) -> Force {
+    /// The ground's impulse on the character; marks in `pressed` the nodes that push on it.
+    pub fn report(&self, pose: &Pose, pressed: &mut [bool]) -> Force {
         let mut sum = Force::default();
         for point in &self.points {
             let node = self.touchers[point.toucher].node;

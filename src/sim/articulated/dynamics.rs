@@ -33,8 +33,10 @@ pub(super) struct Dynamics {
     yielding: Vec<f32x4>,
     /// Torque of every drive if its coordinate kept its velocity.
     torques: Vec<f32x4>,
-    /// Drives at their limit since the last step: the sign of their torque, else 0.
+    /// Drives that were found beyond their limit: the sign of their torque, else 0.
     saturated: Vec<f32x4>,
+    /// Those that were held to it in this step, likewise.
+    held: Vec<f32x4>,
     /// Impulses at the centres of mass of nodes that the next step gives.
     pushes: Vec<(usize, Vector3<f32>)>,
 }
@@ -57,6 +59,7 @@ impl Dynamics {
             yielding: vec![f32x4::ZERO; blocks],
             torques: vec![f32x4::ZERO; blocks],
             saturated: vec![f32x4::ZERO; blocks],
+            held: vec![f32x4::ZERO; blocks],
             pushes: Vec::new(),
         }
     }
@@ -120,7 +123,7 @@ impl Dynamics {
         let weight = Vector3::new(0.0, 0.0, -GRAVITY * self.whole.mass());
         let mut impulse = Force::at(weight * dt, &self.whole.com());
         self.sweep_out(tree);
-        for (node, push) in self.pushes.drain(..) {
+        for &(node, push) in &self.pushes {
             let push = Force::at(push, &pose.places[node].point(&tree.nodes[node].com));
             impulse += push;
             self.forces[node] = self.forces[node] - push * (1.0 / dt);
@@ -132,17 +135,28 @@ impl Dynamics {
         impulse
     }
 
-    /// Solves the other half, changes the velocity, and sees which drives went beyond their limit: they get no more
-    /// than that in the next step.
-    pub fn finish(&mut self, tree: &Tree, pose: &mut Pose, dt: f32) {
+    /// Solves the other half, and sees which drives went beyond their limit. Whether there are new ones: then the step has
+    /// to be taken again, for they get no more than that.
+    pub fn finish(&mut self, tree: &Tree, dt: f32) -> bool {
         self.matrix.finish(&mut self.change);
+        let mut fresh = false;
         for (k, gains) in tree.gains.iter().enumerate() {
-            pose.velocity[k] += self.change[k];
             let back = self.yielding[k] * self.change[k] * f32x4::splat(1.0 / dt);
             let torque = self.torques[k] - back;
             let over = torque.abs().simd_ge(gains.limit) & gains.limit.simd_gt(f32x4::ZERO);
             let sign = torque.is_sign_negative().select(-f32x4::ONE, f32x4::ONE);
-            self.saturated[k] = over.select(sign, f32x4::ZERO);
+            let saturated = over.select(sign, f32x4::ZERO);
+            fresh |= (over & self.held[k].simd_eq(f32x4::ZERO)).any();
+            self.saturated[k] = saturated;
+        }
+        fresh
+    }
+
+    /// Changes the velocity by what was solved for.
+    pub fn apply(&mut self, pose: &mut Pose) {
+        self.pushes.clear();
+        for (velocity, change) in pose.velocity.iter_mut().zip(&self.change) {
+            *velocity += *change;
         }
     }
 
@@ -201,6 +215,7 @@ impl Dynamics {
             let torque = -(gains.kp * four(&error)) - along * pose.velocity[k];
             // Zero where it isn't saturated, so never beyond.
             let held = (torque * self.saturated[k]).simd_gt(gains.limit);
+            self.held[k] = held.select(self.saturated[k], f32x4::ZERO);
             self.torques[k] = held.select(self.saturated[k] * gains.limit, torque);
             self.yielding[k] = held.select(f32x4::ZERO, dt * along);
             self.change[k] += dt * self.torques[k];

@@ -17,7 +17,11 @@ use contact::{Contacts, Ground};
 use dynamics::Dynamics;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pose::Pose;
+use spatial::Force;
 use tree::Tree;
+
+/// How often a step is taken at most, until no drive is beyond its limit.
+const MOST_PASSES: usize = 3;
 
 pub(super) struct Articulated {
     tree: Tree,
@@ -105,12 +109,17 @@ impl Articulated {
             friction: self.friction,
             yielding: self.settings.contact_s as f32,
         };
-        let mut outside = dynamics.accelerate(tree, pose, &self.targets, dt);
-        outside += self
-            .contacts
-            .resolve(tree, pose, dynamics, &ground, contacts);
+        let mut outside = Force::default();
+        for _ in 0..MOST_PASSES {
+            outside = dynamics.accelerate(tree, pose, &self.targets, dt);
+            self.contacts.resolve(tree, pose, dynamics, &ground);
+            if !dynamics.finish(tree, dt) {
+                break;
+            }
+        }
+        outside += self.contacts.report(pose, contacts);
         let momentum = dynamics.momentum_after(&outside);
-        dynamics.finish(tree, pose, dt);
+        dynamics.apply(pose);
         pose.advance(tree, dt);
         dynamics.survey(tree, pose, self.mass);
         dynamics.conserve(pose, &momentum);
