@@ -3,7 +3,8 @@
 usage: python mujoco_policy.py RUN [--seconds S] [--start SHARE] [--view]
 
 Reads the run's policy and reference, builds observation and joint targets as `mimic` does (src/task), and lets MuJoCo's
-own position actuators drive the character of the same MJCF. Prints how long it lasts, how far the bodies are from their
+own position actuators drive the character of the same MJCF. Those of a ball joint compare rotation vectors component by
+component; so that they turn it along the rotation that is left, as `mimic` does, they are aimed anew in every step. Prints how long it lasts, how far the bodies are from their
 reference, and says how it ended; exits 1 if it fell. For policies of the default preset (observations `tracking`, actions
 `residual`) on characters of ball joints and single hinges. Needs the packages mujoco, numpy and safetensors.
 """
@@ -87,6 +88,26 @@ class Bodies:
         rotation = mix(self.rotation, near)
         rotation /= np.linalg.norm(rotation, axis=-1, keepdims=True)
         return Bodies(mix(self.position, other.position), rotation, mix(self.linear, other.linear), mix(self.angular, other.angular))
+
+
+class Servos:
+    """Aims the actuators of ball joints so that they turn along the rotation that is left to their target."""
+
+    def __init__(self, model):
+        balls = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_BALL)
+        self.at = model.jnt_qposadr[balls][:, None] + np.arange(4)
+        own = [np.flatnonzero(model.actuator_trnid[:, 0] == ball) for ball in balls]
+        axis = lambda a: np.argmax(np.abs(model.actuator_gear[a][:, :3]), axis=1)
+        self.actuators = np.array([a[axis(a).argsort()] for a in own], int).reshape(-1, 3)
+
+    def goals(self, control):
+        """Target rotations whose rotation vectors `control` holds."""
+        return np.array([quaternion(v) for v in control[self.actuators]]).reshape(-1, 4)
+
+    def aim(self, data, goals):
+        now = data.qpos[self.at]
+        left = rotation_vector(multiply(inverse(now), goals))
+        data.ctrl[self.actuators] = rotation_vector(now) + left
 
 
 class Reference:
@@ -299,13 +320,16 @@ def perform(agent, seconds, start, show=None):
     reference = agent.reference
     time = begun = start * reference.duration
     data = initial(agent, time)
-    touching, errors = list(reference.sample(time)[1]), []
+    touching, errors, servos = list(reference.sample(time)[1]), [], Servos(agent.model)
     end = seconds if reference.loops else min(seconds, reference.duration - begun)
     while time - begun < end - 1e-9:
         wanted, wanted_contacts, phase = reference.sample(time + agent.dt)
         action = agent.act(agent.observe(Bodies.of(agent.model, data), touching, wanted, wanted_contacts, phase))
         data.ctrl[:] = agent.targets(wanted, action)
-        mujoco.mj_step(agent.model, data, SUBSTEPS)
+        goals = servos.goals(data.ctrl)
+        for _ in range(SUBSTEPS):
+            servos.aim(data, goals)
+            mujoco.mj_step(agent.model, data)
         mujoco.mj_forward(agent.model, data)
         time += agent.dt
         if show:

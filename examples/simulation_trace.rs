@@ -55,16 +55,17 @@ fn states(
         .collect())
 }
 
-/// A hinge's angle, a ball's rotation vector, of all drives in their order.
+/// A hinge's angle, a ball's rotation vector, of all drives in their order. Several hinges of one body are held at rest.
 fn targets(character: &Character, control: &[f32]) -> Vec<Target> {
+    let turn = |v: &[f32]| UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(v));
     let target = |link: &Link| {
         let own = &control[link.dof..link.dof + link.joint.dof()];
         match link.joint {
             LinkJoint::Free => Target::Free,
             LinkJoint::Hinge { .. } => Target::Hinge(own[0]),
-            _ => Target::Ball(UnitQuaternion::from_scaled_axis(Vector3::new(
-                own[0], own[1], own[2],
-            ))),
+            LinkJoint::Ball { .. } => Target::Ball(turn(own)),
+            // Held where they are at rest.
+            LinkJoint::Hinges { .. } => Target::Ball(UnitQuaternion::identity()),
         }
     };
     character.links.iter().map(target).collect()
