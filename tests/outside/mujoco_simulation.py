@@ -4,7 +4,7 @@ usage: python mujoco_simulation.py SIMULATION_TRACE [SKELETON.xml]
 
 SIMULATION_TRACE is the built example of that name. In flight all drives go to random targets, many at their force limit.
 The bodies' positions after 0.1 and 0.5 s must come to MuJoCo's (at 5 kHz) as the rate of physics grows: 1920 Hz has to be
-within 4 mm, 240 Hz within 25 mm. On the ground the drives hold the rest pose: the root has to be within 5 mm of MuJoCo's
+within 6 mm, 240 Hz within 25 mm. On the ground the drives hold the rest pose: the root has to be within 5 mm of MuJoCo's
 height after a second, whose contacts are soft. Exits 1 otherwise.
 """
 
