@@ -1,3 +1,4 @@
+mod jumps;
 mod recorded;
 mod trimmed;
 mod windows;
