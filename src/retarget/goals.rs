@@ -103,8 +103,9 @@ impl Goals {
         let builder = Builder::new(map, alignment, skeleton);
         for f in 0..clip.frames.len() {
             let source = clip.world(f);
-            let rotations = builder.rotations(&source);
+            let mut rotations = builder.rotations(&source);
             let (qpos, bodies) = builder.guess(&source, &rotations, goals.guess.last());
+            builder.turn_head_within_limits(&qpos, &bodies, &mut rotations);
             goals
                 .points
                 .push(builder.points(&goals.keys, &source, &bodies));
@@ -229,6 +230,27 @@ impl<'a> Builder<'a> {
             limits::unwrap(self.skeleton, before, &mut qpos);
         }
         (qpos, reached)
+    }
+
+    /// A head that turns further than a neck can must not take chest and arms along.
+    fn turn_head_within_limits(
+        &self,
+        qpos: &[f64],
+        bodies: &[Isometry3<f64>],
+        rotations: &mut [UnitQuaternion<f64>],
+    ) {
+        let Some(&head) = self.skeleton.slots.get(&Slot::Head) else {
+            return;
+        };
+        let (Some(bind), Some(neck)) = (self.bind_of[head], self.skeleton.bodies[head].parent)
+        else {
+            return;
+        };
+        let mut within = qpos.to_vec();
+        limits::clamp(self.skeleton, &mut within);
+        let within = self.skeleton.forward(&within);
+        let turn = within[neck].rotation.inverse() * within[head].rotation;
+        rotations[bind] = bodies[neck].rotation * turn;
     }
 
     /// Middle between the hip joints.

@@ -2,6 +2,7 @@
 
 use super::super::goals::LEGS;
 use super::*;
+use std::f64::consts::TAU;
 
 /// Steps on the spot, knees and hips bent.
 fn stepping(skeleton: &Skeleton) -> Vec<Vec<f64>> {
@@ -36,6 +37,28 @@ fn a_rest_pose_with_a_leg_in_the_air_makes_no_difference() {
             assert!(away < 0.01, "frame {f}, {slot}: {away} m");
             let turned = found.rotation.angle_to(&expected.rotation);
             assert!(turned < 0.05, "frame {f}, {slot}: {turned} rad");
+        }
+    }
+}
+
+/// A robot's can, and no neck of a skeleton.
+#[test]
+fn a_head_that_turns_all_the_way_round_takes_nothing_along() {
+    let skeleton = humanoid();
+    let pose = |f: i32| {
+        let mut qpos = skeleton.rest_qpos();
+        let angle = TAU * f64::from(f) / 40.0;
+        turned(&skeleton, &mut qpos, Slot::Head, [0.0, 0.0, angle]);
+        qpos
+    };
+    let frames: Vec<Vec<f64>> = (0..40).map(pose).collect();
+    let rest = skeleton.rest_qpos();
+    let done = on_humanoid(&rig(&skeleton, &rest, &frames, 1.0, 0.0));
+    let (hips, chest) = (skeleton.slots[&Slot::Hips], skeleton.slots[&Slot::Chest]);
+    for (f, bodies) in done.motion.bodies.iter().enumerate() {
+        for body in [hips, chest] {
+            let turned = bodies[body].rotation.angle();
+            assert!(turned < 0.05, "frame {f}: {turned} rad");
         }
     }
 }
