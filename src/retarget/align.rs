@@ -34,6 +34,8 @@ const ARM_PAIRS: [[Slot; 2]; 3] = [
     [Slot::RightLowerArm, Slot::LeftLowerArm],
     [Slot::RightHand, Slot::LeftHand],
 ];
+/// Cosine of how far a shin leans over a foot that stands: ankles bend no further.
+const STANDS: f64 = 0.8;
 /// Joints nearer to each other coincide, leg lengths.
 const APART: f64 = 0.01;
 
@@ -124,10 +126,15 @@ impl Figure {
             Slot::Hips | Slot::Spine => (self.across(&LEG_PAIRS).unwrap_or(left), up),
             Slot::Chest | Slot::Neck | Slot::Head => (self.across(&ARM_PAIRS).unwrap_or(left), up),
             Slot::LeftFoot | Slot::LeftToes => {
-                (self.toward(Slot::LeftFoot, Slot::LeftToes, forward), up)
+                return self.foot(Slot::LeftLowerLeg, Slot::LeftFoot, Slot::LeftToes);
             }
             Slot::RightFoot | Slot::RightToes => {
-                (self.toward(Slot::RightFoot, Slot::RightToes, forward), up)
+                return self.foot(Slot::RightLowerLeg, Slot::RightFoot, Slot::RightToes);
+            }
+            // Knees turn about the axis to the left, however far a leg is lifted.
+            Slot::LeftUpperLeg | Slot::LeftLowerLeg | Slot::RightUpperLeg | Slot::RightLowerLeg => {
+                let along = self.limb_direction(slot)?;
+                return basis(&along, &along.cross(&left));
             }
             limb => (self.limb_direction(limb)?, forward),
         };
@@ -162,10 +169,22 @@ impl Figure {
         self.span(from, to).or(upper_arm)?.try_normalize(1e-9)
     }
 
-    /// Horizontal direction from a foot to its toes; without toes, `forward`.
-    fn toward(&self, foot: Slot, toes: Slot, forward: Vector3<f64>) -> Vector3<f64> {
-        let flat = self.span(foot, toes).map(|v| Vector3::new(v.x, v.y, 0.0));
-        flat.and_then(|v| v.try_normalize(1e-3)).unwrap_or(forward)
+    /// A foot's orientation: its sole is level, or would be if the shin stood.
+    fn foot(&self, shin: Slot, foot: Slot, toes: Slot) -> Option<UnitQuaternion<f64>> {
+        let (up, forward) = (Vector3::z(), self.left()?.cross(&Vector3::z()));
+        let lean = self.lean(shin).unwrap_or_else(UnitQuaternion::identity);
+        let level = |v: Vector3<f64>| (lean.inverse() * v).xy().push(0.0);
+        let toes = self.span(foot, toes).map(level);
+        let toward = toes.and_then(|v| v.try_normalize(1e-3));
+        Some(lean * basis(&toward.unwrap_or(forward), &up)?)
+    }
+
+    /// How a shin is turned from upright, if it leans so far that its foot can't stand on the ground.
+    fn lean(&self, shin: Slot) -> Option<UnitQuaternion<f64>> {
+        let (down, along, left) = (-Vector3::z(), self.limb_direction(shin)?, self.left()?);
+        let leans = along.dot(&down) < STANDS;
+        let leg = |along: &Vector3<f64>| basis(along, &along.cross(&left));
+        leans.then_some(leg(&along)? * leg(&down)?.inverse())
     }
 }
 

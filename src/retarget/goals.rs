@@ -34,6 +34,8 @@ pub(super) struct Goals {
     pub rotations: Vec<Vec<UnitQuaternion<f64>>>,
     /// `guess[f]`: coordinates that take over the source's orientations.
     pub guess: Vec<Vec<f64>>,
+    /// `hanging[f]`: from each ankle's goal to where the ankle is at the end of the skeleton's own leg.
+    pub hanging: Vec<[Vector3<f64>; 2]>,
 }
 
 /// Weight of a slot's point, and of its orientation in metres per radian.
@@ -48,7 +50,7 @@ fn weights(slot: Slot) -> (f64, f64) {
         Slot::LeftLowerArm | Slot::RightLowerArm => (0.7, 0.0),
         Slot::LeftHand | Slot::RightHand => (1.0, 0.02),
         Slot::LeftUpperLeg | Slot::RightUpperLeg => (0.0, 0.05),
-        Slot::LeftLowerLeg | Slot::RightLowerLeg => (0.5, 0.0),
+        Slot::LeftLowerLeg | Slot::RightLowerLeg => (0.6, 0.0),
         Slot::LeftFoot | Slot::RightFoot => (2.0, 0.2),
         Slot::LeftToes | Slot::RightToes => (0.0, 0.02),
         Slot::LeftShoulder | Slot::RightShoulder => (0.0, 0.02),
@@ -99,15 +101,17 @@ impl Goals {
             points: Vec::with_capacity(clip.frames.len()),
             rotations: Vec::with_capacity(clip.frames.len()),
             guess: Vec::with_capacity(clip.frames.len()),
+            hanging: Vec::with_capacity(clip.frames.len()),
         };
         let builder = Builder::new(map, alignment, skeleton);
         for f in 0..clip.frames.len() {
             let source = clip.world(f);
-            let rotations = builder.rotations(&source);
+            let mut rotations = builder.rotations(&source);
             let (qpos, bodies) = builder.guess(&source, &rotations, goals.guess.last());
-            goals
-                .points
-                .push(builder.points(&goals.keys, &source, &bodies));
+            builder.turn_head_within_limits(&qpos, &bodies, &mut rotations);
+            let (points, hanging) = builder.points(&goals.keys, &source, &bodies);
+            goals.points.push(points);
+            goals.hanging.push(hanging);
             let chosen = turns.iter().map(|(i, _)| rotations[*i]);
             goals.rotations.push(chosen.collect());
             goals.guess.push(qpos);
@@ -124,6 +128,7 @@ impl Goals {
         super::keep(&mut self.points, own);
         super::keep(&mut self.rotations, own);
         super::keep(&mut self.guess, own);
+        super::keep(&mut self.hanging, own);
     }
 
     /// Moves everything at frame `f`.
@@ -150,6 +155,8 @@ struct Builder<'a> {
     skeleton: &'a Skeleton,
     /// Place in `alignment.binds` of every body's bind.
     bind_of: Vec<Option<usize>>,
+    /// The bodies in the skeleton's rest pose.
+    rest: Vec<Isometry3<f64>>,
 }
 
 impl<'a> Builder<'a> {
@@ -163,6 +170,7 @@ impl<'a> Builder<'a> {
             alignment,
             skeleton,
             bind_of,
+            rest: skeleton.forward(&skeleton.rest_qpos()),
         }
     }
 
@@ -231,6 +239,27 @@ impl<'a> Builder<'a> {
         (qpos, reached)
     }
 
+    /// A head that turns further than a neck can must not take chest and arms along.
+    fn turn_head_within_limits(
+        &self,
+        qpos: &[f64],
+        bodies: &[Isometry3<f64>],
+        rotations: &mut [UnitQuaternion<f64>],
+    ) {
+        let Some(&head) = self.skeleton.slots.get(&Slot::Head) else {
+            return;
+        };
+        let (Some(bind), Some(neck)) = (self.bind_of[head], self.skeleton.bodies[head].parent)
+        else {
+            return;
+        };
+        let mut within = qpos.to_vec();
+        limits::clamp(self.skeleton, &mut within);
+        let within = self.skeleton.forward(&within);
+        let turn = within[neck].rotation.inverse() * within[head].rotation;
+        rotations[bind] = bodies[neck].rotation * turn;
+    }
+
     /// Middle between the hip joints.
     fn hip_middle(&self, bodies: &[Isometry3<f64>]) -> Vector3<f64> {
         let hip = |slot: Slot| {
@@ -253,13 +282,13 @@ impl<'a> Builder<'a> {
     }
 
     /// Goals of the keys: hips and shoulders where the guess has them, limbs in the source's directions with the
-    /// skeleton's lengths, ankles where the scaled source has them.
+    /// skeleton's lengths, ankles where the scaled source has them; and how far that is from the end of the leg.
     fn points(
         &self,
         keys: &[Key],
         source: &[Isometry3<f64>],
         bodies: &[Isometry3<f64>],
-    ) -> Vec<Vector3<f64>> {
+    ) -> (Vec<Vector3<f64>>, [Vector3<f64>; 2]) {
         let at = |body: usize| bodies[body].translation.vector;
         let mut points: Vec<Vector3<f64>> = keys.iter().map(|key| at(key.body)).collect();
         let place = |slot: Slot| keys.iter().position(|key| key.slot == slot);
@@ -277,12 +306,15 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        for leg in &LEGS {
+        let mut hanging = [Vector3::zeros(); 2];
+        for (leg, hanging) in LEGS.iter().zip(&mut hanging) {
             if let (Some(k), Some(p)) = (place(leg[2]), self.source_point(source, leg[2])) {
-                points[k] = p + self.hip_offset(leg[0], source, bodies);
+                let p = p + self.hip_offset(leg[0], source, bodies);
+                *hanging = points[k] - p;
+                points[k] = p;
             }
         }
-        points
+        (points, hanging)
     }
 
     /// Where the skeleton's hip joint is beside the source's: feet stand as far apart as suits its hips.
@@ -304,12 +336,11 @@ impl<'a> Builder<'a> {
 
     /// The skeleton's bone from one slot to the next in the source's direction.
     fn bone(&self, source: &[Isometry3<f64>], from: Slot, to: Slot) -> Option<Vector3<f64>> {
-        let body = self
-            .skeleton
-            .slots
-            .get(&to)
-            .map(|b| &self.skeleton.bodies[*b])?;
+        // There may be links between the two: an ankle of two hinges has one.
+        let body = |slot: Slot| self.skeleton.slots.get(&slot).copied();
+        let ends = [self.rest[body(from)?], self.rest[body(to)?]];
+        let length = (ends[1].translation.vector - ends[0].translation.vector).norm();
         let direction = self.source_point(source, to)? - self.source_point(source, from)?;
-        Some(direction.try_normalize(1e-9)? * body.rest.translation.vector.norm())
+        Some(direction.try_normalize(1e-9)? * length)
     }
 }

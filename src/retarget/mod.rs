@@ -21,6 +21,7 @@ mod seam;
 mod solve;
 mod source;
 mod stance;
+mod swing;
 mod system;
 mod travel;
 
@@ -123,6 +124,7 @@ pub fn retarget(
     let mut problems = clip.problems.clone();
     problems.extend(restore_travel(clip, &model, &mut goals, &mut source));
     let mut contacts = put_on_ground(clip, &model, &mut goals, &mut source, own.start);
+    swing::hang(&mut goals, ankle_height(skeleton), leg);
     let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
     let cycle = wraps.then(|| seam::cycle(&goals, &model));
     if let Some(cycle) = &cycle {

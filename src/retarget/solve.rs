@@ -21,8 +21,9 @@ const REACH: f64 = 0.2;
 const MOST_REACH: usize = 200;
 /// Damping at the start, relative to the mean diagonal.
 const DAMPING: f64 = 1e-5;
-/// Damping at which a step that gains nothing ends the search.
-const STIFF: f64 = 0.1;
+/// Damping at which a step that gains nothing ends the search. Where limbs meet the ground or leave it in a step, less
+/// leaves a search far from its end.
+const STIFF: f64 = 10.0;
 /// Change of the damping after a step that gained, and after one that did not.
 const ON_GAIN: f64 = 0.3;
 const ON_LOSS: f64 = 30.0;

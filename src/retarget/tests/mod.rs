@@ -1,3 +1,4 @@
+mod jumps;
 mod recorded;
 mod trimmed;
 mod windows;
@@ -262,6 +263,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
             .map(|q| skeleton.forward(q).iter().map(|b| b.rotation).collect())
             .collect(),
         guess,
+        hanging: Vec::new(),
     };
     let anchor = |knob| Anchor {
         knob,

@@ -41,6 +41,7 @@ fn swinging(model: &Model) -> Goals {
         points: (0..FRAMES).map(places).collect(),
         rotations: (0..FRAMES).map(rotations).collect(),
         guess: (0..FRAMES).map(|f| pose(f, 0.2)).collect(),
+        hanging: Vec::new(),
     }
 }
 
