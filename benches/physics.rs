@@ -4,7 +4,7 @@
 
 use mimic::sim::{Character, Engine, LinkJoint, LinkState, Settings, Target, World};
 use mimic::skeleton::Skeleton;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use std::time::Instant;
 
 const ROUNDS: usize = 7;
@@ -16,7 +16,7 @@ fn main() {
     let character = Character::new(&skeleton).expect("it can be simulated");
     let mut rest = skeleton.rest_qpos();
     rest[2] -= skeleton.lowest_point(&skeleton.forward(&rest));
-    let start = standing(&skeleton, &character, &rest);
+    let start = character.states(&skeleton, &rest, &vec![0.0; skeleton.nv]);
     println!("{name}: thousands of physics steps a second, median of {ROUNDS}");
     for (what, lift, swing) in [
         ("stands", 0.0, 0.0),
@@ -89,19 +89,5 @@ fn targets(character: &Character, step: usize, swing: f32) -> Vec<Target> {
             LinkJoint::Hinge { .. } => Target::Hinge(0.8 * swing + 0.6 * at(i)),
             LinkJoint::Ball { .. } | LinkJoint::Hinges { .. } => Target::Ball(turn(i)),
         })
-        .collect()
-}
-
-fn standing(skeleton: &Skeleton, character: &Character, rest: &[f64]) -> Vec<LinkState> {
-    let poses: Vec<Isometry3<f64>> = skeleton.forward(rest);
-    let still = |body: usize| LinkState {
-        pose: poses[body].cast(),
-        linear: Vector3::zeros(),
-        angular: Vector3::zeros(),
-    };
-    character
-        .links
-        .iter()
-        .map(|link| still(link.body))
         .collect()
 }

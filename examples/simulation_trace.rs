@@ -42,17 +42,7 @@ fn states(
 ) -> Result<Vec<LinkState>, Box<dyn Error>> {
     let qpos: Vec<f64> = serde_json::from_value(start["qpos"].clone())?;
     let qvel: Vec<f64> = serde_json::from_value(start["qvel"].clone())?;
-    let (poses, twists) = (skeleton.forward(&qpos), skeleton.twists(&qpos, &qvel));
-    let state = |body: usize| LinkState {
-        pose: poses[body].cast(),
-        linear: twists[body].linear.cast(),
-        angular: twists[body].angular.cast(),
-    };
-    Ok(character
-        .links
-        .iter()
-        .map(|link| state(link.body))
-        .collect())
+    Ok(character.states(skeleton, &qpos, &qvel))
 }
 
 /// A hinge's angle, a ball's rotation vector, of all drives in their order. Several hinges of one body are held at rest.

@@ -14,22 +14,8 @@ fn stage() -> Stage {
 
 /// The humanoid in its rest pose.
 fn standing(stage: &Stage) -> Vec<LinkState> {
-    let mut states: Vec<LinkState> = Vec::new();
-    for link in &stage.character.links {
-        let pose = match link.parent {
-            None => Isometry3::from_parts(
-                Translation3::new(0.0, 0.0, 0.881416),
-                UnitQuaternion::identity(),
-            ),
-            Some(p) => states[p].pose * link.rest.cast(),
-        };
-        states.push(LinkState {
-            pose,
-            linear: Vector3::zeros(),
-            angular: Vector3::zeros(),
-        });
-    }
-    states
+    let (rest, still) = (stage.skeleton.rest_qpos(), vec![0.0; stage.skeleton.nv]);
+    stage.character.states(&stage.skeleton, &rest, &still)
 }
 
 fn feet(stage: &Stage) -> Vec<usize> {

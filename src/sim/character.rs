@@ -1,6 +1,6 @@
 //! A skeleton as the simulation sees it: welded bodies are one link, and a link has one joint.
 
-use super::SimError;
+use super::{LinkState, SimError};
 use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton};
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -164,6 +164,17 @@ impl Character {
             link.com = center;
             link.mass = mass;
         }
+    }
+
+    /// States of the links of `skeleton`, which this character was made of, at its coordinates and their velocities.
+    pub fn states(&self, skeleton: &Skeleton, qpos: &[f64], qvel: &[f64]) -> Vec<LinkState> {
+        let (poses, twists) = (skeleton.forward(qpos), skeleton.twists(qpos, qvel));
+        let state = |link: &Link| LinkState {
+            pose: poses[link.body].cast(),
+            linear: twists[link.body].linear.cast(),
+            angular: twists[link.body].angular.cast(),
+        };
+        self.links.iter().map(state).collect()
     }
 
     /// Joint rotation of link `link` from the rotations of all links: identity at rest.

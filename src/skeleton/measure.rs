@@ -149,22 +149,23 @@ impl Shape {
     }
 
     fn ground_points(&self, pose: &Isometry3<f64>) -> Vec<Vector3<f64>> {
-        let pole = |p: &Vector3<f64>, radius: f64| {
-            (pose * Point3::from(*p)).coords - Vector3::z() * radius
-        };
+        let pole = |(at, radius): (Point3<f64>, f64)| (pose * at).coords - Vector3::z() * radius;
+        self.tips().into_iter().map(pole).collect()
+    }
+
+    /// The points that are the lowest in one pose or another, in the body's frame, each with the radius of a ball about
+    /// it: centres of spheres, ends of capsules, corners of boxes.
+    pub(crate) fn tips(&self) -> Vec<(Point3<f64>, f64)> {
         match self {
-            Shape::Sphere { center, radius } => vec![pole(center, *radius)],
-            Shape::Capsule { a, b, radius } => vec![pole(a, *radius), pole(b, *radius)],
-            Shape::Box { pose: local, half } => {
-                let placed = pose * local;
-                (0..8)
-                    .map(|corner| {
-                        let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
-                        let signs = Vector3::new(sign(0), sign(1), sign(2));
-                        (placed * Point3::from(half.component_mul(&signs))).coords
-                    })
-                    .collect()
-            }
+            Shape::Sphere { center, radius } => vec![(Point3::from(*center), *radius)],
+            Shape::Capsule { a, b, radius } => [a, b].map(|p| (Point3::from(*p), *radius)).into(),
+            Shape::Box { pose, half } => (0..8)
+                .map(|corner| {
+                    let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+                    let signs = Vector3::new(sign(0), sign(1), sign(2));
+                    (pose * Point3::from(half.component_mul(&signs)), 0.0)
+                })
+                .collect(),
         }
     }
 }

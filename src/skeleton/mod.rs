@@ -19,6 +19,7 @@ mod shape;
 mod slots;
 
 pub use error::SkeletonError;
+pub(crate) use rotations::twist;
 
 use crate::humanoid::Slot;
 use nalgebra::{Isometry3, Matrix3, Vector3};

@@ -131,7 +131,7 @@ fn cost(hinges: &[&Joint], angles: &[f64], wanted: &[f64]) -> f64 {
 }
 
 /// Angle of the part of `rotation` that is about `axis` (swing-twist decomposition), in (−π, π].
-fn twist(rotation: &UnitQuaternion<f64>, axis: &Vector3<f64>) -> f64 {
+pub(crate) fn twist(rotation: &UnitQuaternion<f64>, axis: &Vector3<f64>) -> f64 {
     let half = rotation.imag().dot(axis).atan2(rotation.w);
     let angle = 2.0 * half;
     angle - TAU * (angle / TAU).round()

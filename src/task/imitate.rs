@@ -109,13 +109,12 @@ impl Imitate {
         let root = poses[0].translation.vector;
         let center = nalgebra::Translation3::new(-root.x as f32, -root.y as f32, 0.0);
         let place = raise * self.next.anchor * center;
-        let still = |body: usize| LinkState {
-            pose: place * poses[body].cast::<f32>(),
-            linear: Vector3::zeros(),
-            angular: Vector3::zeros(),
-        };
-        let links = self.stage.character.links.iter();
-        let states: Vec<LinkState> = links.map(|link| still(link.body)).collect();
+        let still = vec![0.0; skeleton.nv];
+        let rest = skeleton.rest_qpos();
+        let mut states = self.stage.character.states(skeleton, &rest, &still);
+        for state in &mut states {
+            state.pose = place * state.pose;
+        }
         let lowest = skeleton.lowest_point(&poses);
         let stands = |link: &usize| {
             let body = self.stage.character.links[*link].body;

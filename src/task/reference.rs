@@ -172,16 +172,8 @@ pub(super) fn heading(turn: &UnitQuaternion<f32>) -> UnitQuaternion<f32> {
 fn link_states(motion: &Motion, stage: &Stage, time: f64) -> Vec<LinkState> {
     let skeleton = &stage.skeleton;
     let qpos = motion.sample_qpos(skeleton, time);
-    let poses = skeleton.forward(&qpos);
-    let twists = skeleton.twists(&qpos, &motion.sample_qvel(time));
-    let links = stage.character.links.iter();
-    links
-        .map(|link| LinkState {
-            pose: poses[link.body].cast(),
-            linear: twists[link.body].linear.cast(),
-            angular: twists[link.body].angular.cast(),
-        })
-        .collect()
+    let qvel = motion.sample_qvel(time);
+    stage.character.states(skeleton, &qpos, &qvel)
 }
 
 fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {

@@ -189,6 +189,7 @@ impl Setting {
                 1.0..=1e3,
                 "1 to 1000",
             ),
+            ("contact_s", physics.contact_s, 0.0..=1.0, "0 to 1"),
             ("episode_s", self.episode_s, positive.clone(), "positive"),
             (
                 "the smallest reward weight",

@@ -2,8 +2,8 @@
 //!
 //! Every point near the ground has an impulse, which must stop it from going into the ground, can't pull, and rubs
 //! within Coulomb's cone. All are solved together, by sweeps of projected Gauss-Seidel. What an impulse on one body
-//! does to the twist of another, J M⁻¹ J'ᵀ, is computed for whole bodies, six by six: points of a body share it. The
-//! drives are in it too, as they are in M.
+//! does to the twist of another, J M⁻¹ J'ᵀ (the Delassus operator), is computed for whole bodies, six by six: points of a
+//! body share it. The drives are in it too, as they are in M.
 
 use super::dynamics::Dynamics;
 use super::pose::{Place, Pose, four, three};
@@ -14,11 +14,12 @@ use wide::f32x4;
 
 /// Points nearer to the ground than this at the end of a step are looked at, metres.
 const NEAR: f32 = 0.005;
-/// Share of a depth that is taken back in one step, and the fastest that it may be, m/s.
-const RECOVERY: f32 = 0.2;
+/// Share of a depth that is taken back in one step (the error reduction parameter), and the fastest that it may be, m/s.
+const ERROR_REDUCTION: f32 = 0.2;
 const FASTEST: f32 = 0.5;
-/// Added to a hard point's own response, as a share of it: of redundant points, each bears its part.
-const SOFTNESS: f32 = 1e-3;
+/// Added to a hard point's own response, as a share of it (constraint force mixing): of redundant points, each bears its
+/// part.
+const FORCE_MIXING: f32 = 1e-3;
 /// Of soft contacts, as MuJoCo's have it: how much of its acceleration a point is given at the surface, and below this
 /// depth, metres.
 const IMPEDANCE: [f32; 2] = [0.9, 0.95];
@@ -42,9 +43,9 @@ pub(super) struct Ground {
 /// Twist of a body: its angular velocity, and that of its frame's origin.
 type Twist = [f32x4; 2];
 
-/// A body that touches the ground.
+/// A body with points near the ground.
 #[derive(Clone, Copy, Debug)]
-struct Toucher {
+struct ContactBody {
     node: usize,
     twist: Twist,
     /// Moment about its origin and force: sum of its points' impulses.
@@ -53,7 +54,7 @@ struct Toucher {
 
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    toucher: usize,
+    body: usize,
     /// From the body's origin.
     arm: Vector3<f32>,
     /// Velocity that it is brought to; upwards it may have more.
@@ -71,12 +72,12 @@ struct Point {
 /// Contacts of one step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Contacts {
-    touchers: Vec<Toucher>,
+    bodies: Vec<ContactBody>,
     points: Vec<Point>,
-    /// `[touchers, width]`: halved Jacobians of their twists, along their paths.
+    /// `[bodies, width]`: halved Jacobians of their twists, along their paths.
     halves: Vec<[f32x4; 6]>,
     width: usize,
-    /// `[touchers, touchers]`: twist of the first for each part of the wrench on the second.
+    /// `[bodies, bodies]`: twist of the first for each part of the wrench on the second.
     coupling: Vec<[Twist; 6]>,
     /// By id, of the last step.
     last: Vec<Vector3<f32>>,
@@ -112,7 +113,7 @@ impl Contacts {
     }
 
     fn find(&mut self, tree: &Tree, pose: &Pose, motions: &[Motion], ground: &Ground) {
-        self.touchers.clear();
+        self.bodies.clear();
         self.points.clear();
         let mut id = 0;
         for (i, node) in tree.nodes.iter().enumerate() {
@@ -131,17 +132,17 @@ impl Contacts {
                 let gap = arm.z + place.origin.z + pose.origin.z;
                 let velocity = motion.at(&(place.origin + arm));
                 if gap < NEAR || gap + ground.dt * velocity.z < NEAR {
-                    self.touch(arm, ground.wants(gap, velocity), friction, id);
+                    self.add(arm, ground.wants(gap, velocity), friction, id);
                 }
                 id += 1;
             }
             if self.points.len() > first {
-                self.touchers.push(toucher(i, place, motion));
+                self.bodies.push(body(i, place, motion));
             }
         }
     }
 
-    fn touch(
+    fn add(
         &mut self,
         arm: Vector3<f32>,
         (wanted, softness): (Vector3<f32>, f32),
@@ -149,7 +150,7 @@ impl Contacts {
         id: usize,
     ) {
         self.points.push(Point {
-            toucher: self.touchers.len(),
+            body: self.bodies.len(),
             arm,
             wanted,
             softness,
@@ -160,15 +161,15 @@ impl Contacts {
         });
     }
 
-    /// Halves the Jacobians of the touchers, and adds to their twists what the step does without contacts.
+    /// Halves the Jacobians of the bodies, and adds to their twists what the step does without contacts.
     fn halve(&mut self, tree: &Tree, pose: &Pose, dynamics: &Dynamics) {
         self.halves.clear();
         self.halves
-            .resize(self.touchers.len() * self.width, [f32x4::ZERO; 6]);
+            .resize(self.bodies.len() * self.width, [f32x4::ZERO; 6]);
         let halves = self.halves.chunks_exact_mut(self.width);
-        for (toucher, half) in self.touchers.iter_mut().zip(halves) {
-            let path = &tree.nodes[toucher.node].path;
-            let origin = &pose.places[toucher.node].origin;
+        for (body, half) in self.bodies.iter_mut().zip(halves) {
+            let path = &tree.nodes[body.node].path;
+            let origin = &pose.places[body.node].origin;
             for (half, &block) in half.iter_mut().zip(path) {
                 let [a, b, c] = pose.axes[block].angular;
                 let [x, y, z] = pose.axes[block].at(origin);
@@ -182,17 +183,17 @@ impl Contacts {
                 }
             }
             let change = twist(sums);
-            toucher.twist[0] += change[0];
-            toucher.twist[1] += change[1];
+            body.twist[0] += change[0];
+            body.twist[1] += change[1];
         }
     }
 
     fn couple(&mut self, tree: &Tree) {
-        let count = self.touchers.len();
+        let count = self.bodies.len();
         self.coupling.clear();
         for a in 0..count {
             for b in 0..count {
-                let shared = tree.shared(self.touchers[a].node, self.touchers[b].node);
+                let shared = tree.shared(self.bodies[a].node, self.bodies[b].node);
                 let of = |i: usize| &self.halves[i * self.width..i * self.width + shared];
                 self.coupling.push(std::array::from_fn(|k| {
                     let mut sums = [f32x4::ZERO; 6];
@@ -209,15 +210,12 @@ impl Contacts {
 
     /// What each point does for itself, and where the impulses of the last step lead.
     fn respond(&mut self) {
-        let count = self.touchers.len();
+        let count = self.bodies.len();
         for i in 0..self.points.len() {
             let Point {
-                toucher,
-                arm,
-                impulse,
-                ..
+                body, arm, impulse, ..
             } = self.points[i];
-            let own = &self.coupling[toucher * (count + 1)];
+            let own = &self.coupling[body * (count + 1)];
             for axis in 0..3 {
                 let mut unit = Vector3::zeros();
                 unit[axis] = 1.0;
@@ -225,7 +223,7 @@ impl Contacts {
                 self.points[i].response.set_column(axis, &velocity);
             }
             if impulse != Vector3::zeros() {
-                self.spread(toucher, &arm, &impulse);
+                self.spread(body, &arm, &impulse);
             }
         }
     }
@@ -235,18 +233,18 @@ impl Contacts {
             let mut largest: f32 = 0.0;
             for i in 0..self.points.len() {
                 let Point {
-                    toucher,
+                    body,
                     arm,
                     impulse,
                     response,
                     ..
                 } = self.points[i];
-                let velocity = at(&self.touchers[toucher].twist, &arm);
+                let velocity = at(&self.bodies[body].twist, &arm);
                 let next = self.points[i].next(velocity);
                 let change = next - impulse;
                 if change != Vector3::zeros() {
                     self.points[i].impulse = next;
-                    self.spread(toucher, &arm, &change);
+                    self.spread(body, &arm, &change);
                     largest = largest.max(change.norm() * response[(2, 2)]);
                 }
             }
@@ -260,28 +258,24 @@ impl Contacts {
         }
     }
 
-    /// Gives an impulse at a point of a toucher.
-    fn spread(&mut self, toucher: usize, arm: &Vector3<f32>, impulse: &Vector3<f32>) {
-        let count = self.touchers.len();
+    /// Gives an impulse at a point of a body.
+    fn spread(&mut self, body: usize, arm: &Vector3<f32>, impulse: &Vector3<f32>) {
+        let count = self.bodies.len();
         let wrench = wrench(arm, impulse);
-        for (sum, part) in self.touchers[toucher].wrench.iter_mut().zip(&wrench) {
+        for (sum, part) in self.bodies[body].wrench.iter_mut().zip(&wrench) {
             *sum += part;
         }
-        for (a, other) in self.touchers.iter_mut().enumerate() {
-            let change = answer(&self.coupling[a * count + toucher], &wrench);
+        for (a, other) in self.bodies.iter_mut().enumerate() {
+            let change = answer(&self.coupling[a * count + body], &wrench);
             other.twist[0] += change[0];
             other.twist[1] += change[1];
         }
     }
 
     fn apply(&self, tree: &Tree, change: &mut [f32x4]) {
-        for (toucher, half) in self
-            .touchers
-            .iter()
-            .zip(self.halves.chunks_exact(self.width))
-        {
-            let wrench = toucher.wrench.map(f32x4::splat);
-            for (half, &block) in half.iter().zip(&tree.nodes[toucher.node].path) {
+        for (body, half) in self.bodies.iter().zip(self.halves.chunks_exact(self.width)) {
+            let wrench = body.wrench.map(f32x4::splat);
+            for (half, &block) in half.iter().zip(&tree.nodes[body.node].path) {
                 for (row, part) in half.iter().zip(&wrench) {
                     change[block] += *row * *part;
                 }
@@ -293,7 +287,7 @@ impl Contacts {
     pub fn report(&self, pose: &Pose, pressed: &mut [bool]) -> Force {
         let mut sum = Force::default();
         for point in &self.points {
-            let node = self.touchers[point.toucher].node;
+            let node = self.bodies[point.body].node;
             pressed[node] |= point.impulse.z > 0.0;
             sum += Force::at(point.impulse, &(pose.places[node].origin + point.arm));
         }
@@ -320,8 +314,8 @@ impl Point {
     }
 }
 
-fn toucher(node: usize, place: &Place, motion: &Motion) -> Toucher {
-    Toucher {
+fn body(node: usize, place: &Place, motion: &Motion) -> ContactBody {
+    ContactBody {
         node,
         twist: [four(&motion.angular), four(&motion.at(&place.origin))],
         wrench: [0.0; 6],
@@ -363,14 +357,16 @@ impl Ground {
     /// Velocity that a point `gap` above the ground is brought to, and how softly.
     fn wants(&self, gap: f32, velocity: Vector3<f32>) -> (Vector3<f32>, f32) {
         if self.yielding <= 0.0 {
-            return (Vector3::new(0.0, 0.0, wanted(gap / self.dt)), SOFTNESS);
+            return (Vector3::new(0.0, 0.0, wanted(gap / self.dt)), FORCE_MIXING);
         }
-        // A critically damped spring whose time constant is `yielding` (MuJoCo, "Computation", "Reference").
+        // A critically damped spring whose time constant is `yielding` (MuJoCo, "Computation", "Reference"); of less than two
+        // steps it would overshoot.
+        let yielding = self.yielding.max(2.0 * self.dt);
         let [first, most] = IMPEDANCE;
         let depth = (-gap).max(0.0);
         let impedance = first + (most - first) * (depth / SURFACE).min(1.0);
-        let kept = (1.0 - 2.0 * self.dt / (most * self.yielding)).max(0.0);
-        let back = self.dt * impedance / (most * self.yielding).powi(2) * depth;
+        let kept = (1.0 - 2.0 * self.dt / (most * yielding)).max(0.0);
+        let back = self.dt * impedance / (most * yielding).powi(2) * depth;
         let mut wanted = velocity * kept;
         wanted.z = if gap > 0.0 {
             wanted.z.min(-gap / self.dt)
@@ -386,6 +382,6 @@ fn wanted(room: f32) -> f32 {
     if room > 0.0 {
         -room
     } else {
-        (-room * RECOVERY).min(FASTEST)
+        (-room * ERROR_REDUCTION).min(FASTEST)
     }
 }

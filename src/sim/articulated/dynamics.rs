@@ -1,7 +1,7 @@
 //! Velocities, momentum, and accelerations without contacts: inertia, gravity, what turns with what, and the drives.
 
 use super::matrix::PathMatrix;
-use super::pose::{Pose, four, rotation_vector};
+use super::pose::{Pose, four};
 use super::spatial::{Force, Inertia, Motion};
 use super::tree::{Joint, Tree};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -135,8 +135,8 @@ impl Dynamics {
         impulse
     }
 
-    /// Solves the other half, and sees which drives went beyond their limit. Whether there are new ones: then the step has
-    /// to be taken again, for they get no more than that.
+    /// Solves the other half. True where a drive goes beyond its limit that wasn't held to it: the step then has to be
+    /// taken again, with that drive at the limit.
     pub fn finish(&mut self, tree: &Tree, dt: f32) -> bool {
         self.matrix.finish(&mut self.change);
         let mut fresh = false;
@@ -207,7 +207,7 @@ impl Dynamics {
         for (i, node) in tree.nodes.iter().enumerate() {
             let error = match node.joint {
                 Joint::Free => continue,
-                Joint::Ball => rotation_vector(&(targets[i].inverse() * pose.turns[i])),
+                Joint::Ball => (targets[i].inverse() * pose.turns[i]).scaled_axis(),
                 Joint::Hinge(..) => Vector3::new(pose.angles[i] - targets[i].w, 0.0, 0.0),
             };
             let (k, gains) = (node.block, &tree.gains[node.block]);

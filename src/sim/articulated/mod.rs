@@ -1,8 +1,8 @@
 //! Our own engine: a character in reduced coordinates on a plane.
 //!
-//! Joints can't come apart, as they are the coordinates. A step is semi-implicit: drives are taken at its end, so that
-//! they are stable at any gain, and contacts and stops are solved over the inertia of the whole character. All state
-//! is in [`Pose`], but for what a step hands to the next: contact impulses and drives at their limit.
+//! Joints can't come apart, as they are the coordinates. A step is semi-implicit: drives and the ends of ranges are taken
+//! at its end, so that they are stable at any stiffness, and contacts are solved over the inertia of the whole
+//! character. All state is in [`Pose`], but for what a step hands to the next: contact impulses and drives at their limit.
 
 mod contact;
 mod dynamics;

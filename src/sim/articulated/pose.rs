@@ -3,6 +3,7 @@
 use super::super::world::LinkState;
 use super::spatial::{Axes, Motion};
 use super::tree::{Joint, Node, Tree};
+use crate::skeleton::twist;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use wide::f32x4;
 
@@ -80,7 +81,7 @@ impl Pose {
             let rate = state.pose.rotation.inverse_transform_vector(&apart);
             match node.joint {
                 Joint::Hinge(axis, _) => {
-                    self.angles[i] = twist(&turn, &axis);
+                    self.angles[i] = twist(&turn.cast(), &axis.cast()) as f32;
                     self.velocity[node.block] = f32x4::from([rate.dot(&axis), 0.0, 0.0, 0.0]);
                 }
                 _ => {
@@ -99,9 +100,13 @@ impl Pose {
             match node.joint {
                 Joint::Free => {
                     self.origin += three(self.velocity[0]) * dt;
-                    self.turns[i] = normalized(turned(rate) * self.turns[i]);
+                    self.turns[i] =
+                        normalized(UnitQuaternion::from_scaled_axis(rate) * self.turns[i]);
                 }
-                Joint::Ball => self.turns[i] = normalized(self.turns[i] * turned(rate)),
+                Joint::Ball => {
+                    self.turns[i] =
+                        normalized(self.turns[i] * UnitQuaternion::from_scaled_axis(rate))
+                }
                 Joint::Hinge(..) => self.angles[i] += rate.x,
             }
         }
@@ -171,28 +176,6 @@ pub(super) fn four(v: &Vector3<f32>) -> f32x4 {
 pub(super) fn three(v: f32x4) -> Vector3<f32> {
     let [x, y, z, _] = v.to_array();
     Vector3::new(x, y, z)
-}
-
-/// Angle of a rotation about an axis, in (-π, π].
-fn twist(turn: &UnitQuaternion<f32>, axis: &Vector3<f32>) -> f32 {
-    let part = turn.imag().dot(axis);
-    let sign = if turn.w < 0.0 { -1.0 } else { 1.0 };
-    2.0 * (part * sign).atan2(turn.w * sign)
-}
-
-/// Axis times angle, at most π long.
-pub(super) fn rotation_vector(turn: &UnitQuaternion<f32>) -> Vector3<f32> {
-    let sign = if turn.w < 0.0 { -1.0 } else { 1.0 };
-    let part = turn.imag() * sign;
-    let length = part.norm();
-    if length < 1e-6 {
-        return part * 2.0;
-    }
-    part * (2.0 * length.atan2(turn.w * sign) / length)
-}
-
-fn turned(by: Vector3<f32>) -> UnitQuaternion<f32> {
-    UnitQuaternion::from_scaled_axis(by)
 }
 
 fn normalized(turn: UnitQuaternion<f32>) -> UnitQuaternion<f32> {

@@ -121,9 +121,7 @@ impl Inertia {
             force: motion.linear * self.mass + motion.angular.cross(&self.first),
         }
     }
-}
 
-impl Inertia {
     /// Momenta of axes, each component spread over all lanes: `[axis, component]`.
     pub fn momenta(&self, axes: &Axes) -> [[f32x4; 6]; 3] {
         let ([a, b, c], [u, v, w]) = (axes.angular, axes.linear);
@@ -216,10 +214,7 @@ impl Mul<f32> for Force {
 impl Sub for Force {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        Force {
-            moment: self.moment - other.moment,
-            force: self.force - other.force,
-        }
+        self + other * -1.0
     }
 }
 

@@ -118,7 +118,10 @@ impl Tree {
 }
 
 fn node(link: &Link, path: Vec<usize>) -> Node {
-    let points: Vec<_> = link.shapes.iter().flat_map(points).collect();
+    let tips = link.shapes.iter().flat_map(Shape::tips);
+    let points: Vec<(Vector3<f32>, f32)> = tips
+        .map(|(at, radius)| (at.coords.cast(), radius as f32))
+        .collect();
     let reaches = points.iter().map(|(at, radius)| at.norm() + radius);
     Node {
         reach: reaches.fold(0.0, f32::max),
@@ -157,6 +160,14 @@ fn gains(joint: &LinkJoint) -> Gains {
         LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => drives,
     };
     let each = |of: fn(&Drive) -> f64| {
+        // What may give no force drives nothing.
+        let of = |drive: &Drive| {
+            if drive.force_limit > 0.0 {
+                of(drive)
+            } else {
+                0.0
+            }
+        };
         let value = |k: usize| drives.get(k).map_or(0.0, of).min(f64::from(f32::MAX)) as f32;
         f32x4::from([value(0), value(1), value(2), 0.0])
     };
@@ -164,23 +175,5 @@ fn gains(joint: &LinkJoint) -> Gains {
         kp: each(|drive| drive.kp),
         kd: each(|drive| drive.kd),
         limit: each(|drive| drive.force_limit),
-    }
-}
-
-/// The points of a shape that are lowest in one pose or another.
-fn points(shape: &Shape) -> Vec<(Vector3<f32>, f32)> {
-    let radius = |r: f64| r as f32;
-    match shape {
-        Shape::Sphere { center, radius: r } => vec![(center.cast(), radius(*r))],
-        Shape::Capsule { a, b, radius: r } => {
-            vec![(a.cast(), radius(*r)), (b.cast(), radius(*r))]
-        }
-        Shape::Box { pose, half } => (0..8)
-            .map(|corner| {
-                let side = |axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
-                let at = Vector3::from_fn(|axis, _| side(axis) * half[axis]);
-                ((pose * nalgebra::Point3::from(at)).coords.cast(), 0.0)
-            })
-            .collect(),
     }
 }
