@@ -36,6 +36,14 @@ impl Pentadiagonal {
     /// Cholesky factor in place: `diagonal` becomes L, `next` and `second` L⁻¹ times themselves.
     /// `false` when the matrix is not positive definite.
     pub fn factor(&mut self) -> bool {
+        widely(
+            #[inline(always)]
+            || self.factor_here(),
+        )
+    }
+
+    #[inline(always)]
+    fn factor_here(&mut self) -> bool {
         let (n, size) = (self.n, self.n * self.n);
         for f in 0..self.count {
             let (done, rest) = self.diagonal.split_at_mut((f + 1) * size);
@@ -47,13 +55,14 @@ impl Pentadiagonal {
             let next = &mut next_done[f * size..];
             if f + 1 < self.count {
                 solve_rows(lower, next, n);
-                subtract_product(&mut rest[..size], next, next, n, n);
+                subtract_product(&mut rest[..size], next, next, n, n, |i| i + 1);
             }
             if f + 2 < self.count {
                 let second = &mut self.second[f * size..(f + 1) * size];
                 solve_rows(lower, second, n);
-                subtract_product(&mut next_rest[..size], next, second, n, BLOCK);
-                subtract_product(&mut rest[size..2 * size], second, second, n, BLOCK);
+                subtract_product(&mut next_rest[..size], next, second, n, BLOCK, |_| n);
+                let after = &mut rest[size..2 * size];
+                subtract_product(after, second, second, n, BLOCK, |i| i + 1);
             }
         }
         true
@@ -61,13 +70,21 @@ impl Pentadiagonal {
 
     /// Solves with the factor, in place.
     pub fn solve(&self, x: &mut [f64]) {
+        widely(
+            #[inline(always)]
+            || self.solve_here(x),
+        );
+    }
+
+    #[inline(always)]
+    fn solve_here(&self, x: &mut [f64]) {
         let (n, size) = (self.n, self.n * self.n);
         for f in 0..self.count {
             let (done, rest) = x.split_at_mut((f + 1) * n);
             let here = &mut done[f * n..];
             let lower = &self.diagonal[f * size..(f + 1) * size];
             for i in 0..n {
-                let sum: f64 = (0..i).map(|k| lower[i * n + k] * here[k]).sum();
+                let sum = dot(&lower[i * n..i * n + i], &here[..i]);
                 here[i] = (here[i] - sum) / lower[i * n + i];
             }
             for (ahead, blocks) in [(1, &self.next), (2, &self.second)] {
@@ -88,7 +105,7 @@ impl Pentadiagonal {
                     let block = &blocks[f * size..(f + 1) * size];
                     let there = &rest[(ahead - 1) * n..ahead * n];
                     for (row, value) in block.chunks_exact(n).zip(here.iter_mut()) {
-                        *value -= row.iter().zip(there).map(|(a, b)| a * b).sum::<f64>();
+                        *value -= dot(row, there);
                     }
                 }
             }
@@ -102,6 +119,23 @@ impl Pentadiagonal {
     }
 }
 
+/// Runs `work` with instructions for four numbers at a time where the processor has them; the bits are the same.
+fn widely<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<R>(work: impl FnOnce() -> R) -> R {
+            work()
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has the feature that the function is compiled for.
+            return unsafe { avx2(work) };
+        }
+    }
+    work()
+}
+
+#[inline(always)]
 fn add_scaled(to: &mut [f64], from: &[f64], factor: f64) {
     for (t, s) in to.iter_mut().zip(from) {
         *t += factor * s;
@@ -109,6 +143,7 @@ fn add_scaled(to: &mut [f64], from: &[f64], factor: f64) {
 }
 
 /// Lower Cholesky factor in place, column by column of its transpose so that the inner loops run along rows.
+#[inline(always)]
 fn cholesky(a: &mut [f64], n: usize) -> bool {
     for j in 0..n {
         for i in j..n {
@@ -134,6 +169,7 @@ fn cholesky(a: &mut [f64], n: usize) -> bool {
 }
 
 /// Sum of products in four strands, which the compiler can keep side by side.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -152,6 +188,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// `b` becomes L⁻¹ b.
+#[inline(always)]
 fn solve_rows(lower: &[f64], b: &mut [f64], n: usize) {
     for i in 0..n {
         let (done, rest) = b.split_at_mut(i * n);
@@ -163,6 +200,7 @@ fn solve_rows(lower: &[f64], b: &mut [f64], n: usize) {
 }
 
 /// `row` −= Σₖ factorsₖ · (row k of `rows`), four rows at a time.
+#[inline(always)]
 fn subtract_rows(row: &mut [f64], rows: &[f64], factors: &[f64], n: usize) {
     let fours = factors.len() / 4 * 4;
     for (f, four) in factors[..fours]
@@ -184,8 +222,16 @@ fn subtract_rows(row: &mut [f64], rows: &[f64], factors: &[f64], n: usize) {
     }
 }
 
-/// c −= aᵀ b, where row k of `b` is zero from column `k + reach` on.
-fn subtract_product(c: &mut [f64], a: &[f64], b: &[f64], n: usize, reach: usize) {
+/// c −= aᵀ b, where row k of `b` is zero from column `k + reach` on, in the first `columns(i)` columns of row i.
+#[inline(always)]
+fn subtract_product(
+    c: &mut [f64],
+    a: &[f64],
+    b: &[f64],
+    n: usize,
+    reach: usize,
+    columns: impl Fn(usize) -> usize,
+) {
     let fours = n / 4 * 4;
     for k in (0..fours).step_by(4) {
         let width = n.min(k + 3 + reach);
@@ -198,7 +244,7 @@ fn subtract_product(c: &mut [f64], a: &[f64], b: &[f64], n: usize, reach: usize)
         for i in 0..n {
             let (f0, f1) = (a[k * n + i], a[(k + 1) * n + i]);
             let (f2, f3) = (a[(k + 2) * n + i], a[(k + 3) * n + i]);
-            let out = &mut c[i * n..i * n + width];
+            let out = &mut c[i * n..i * n + width.min(columns(i))];
             for ((((x, p), q), r), s) in out.iter_mut().zip(b0).zip(b1).zip(b2).zip(b3) {
                 *x -= f0 * p + f1 * q + f2 * r + f3 * s;
             }
@@ -208,6 +254,7 @@ fn subtract_product(c: &mut [f64], a: &[f64], b: &[f64], n: usize, reach: usize)
         let width = n.min(k + reach);
         for i in 0..n {
             let factor = a[k * n + i];
+            let width = width.min(columns(i));
             add_scaled(
                 &mut c[i * n..i * n + width],
                 &b[k * n..k * n + width],
