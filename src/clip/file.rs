@@ -309,7 +309,7 @@ fn isometries(
     let places = translation.as_chunks::<3>().0;
     let turns = rotation.as_chunks::<4>().0;
     let isometry = |(i, (t, q)): (usize, (&[f64; 3], &[f64; 4]))| {
-        let q = unit(Quaternion::new(q[0], q[1], q[2], q[3]));
+        let q = stored_rotation(Quaternion::new(q[0], q[1], q[2], q[3]));
         let q = q.ok_or_else(|| format!("tensor `{name}`: rotation {i} is zero"))?;
         Ok(Isometry3::from_parts(
             Translation3::new(t[0], t[1], t[2]),
@@ -319,8 +319,9 @@ fn isometries(
     places.iter().zip(turns).enumerate().map(isometry).collect()
 }
 
-/// A quaternion that is a rotation but for single precision is taken as it stands: rounding it again changes nothing.
-fn unit(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
+/// A stored quaternion that is a rotation but for single precision is taken as it stands: what was saved and what is
+/// loaded are the same, to the bit.
+pub(crate) fn stored_rotation(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
     if (q.norm_squared() - 1.0).abs() < 1e-6 {
         return Some(UnitQuaternion::new_unchecked(q));
     }

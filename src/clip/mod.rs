@@ -11,6 +11,7 @@ mod tests;
 
 pub(crate) use carry::carry;
 pub use error::Error;
+pub(crate) use file::stored_rotation;
 pub use margin::Margin;
 pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
 

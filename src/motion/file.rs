@@ -1,8 +1,8 @@
 //! `NAME.motion`: a safetensors file whose metadata key `mimic` holds a JSON header.
 
 use super::{Cycle, Motion, MotionError, Tracks};
-use crate::clip::{LoopMode, MOST_FPS};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
+use crate::clip::{LoopMode, MOST_FPS, stored_rotation};
+use nalgebra::{Isometry3, Quaternion, Translation3, Vector3, Vector6};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -147,7 +147,7 @@ impl Motion {
         let poses = poses(
             &rows("body_position", 3 * bodies)?,
             &rows("body_rotation", 4 * bodies)?,
-        );
+        )?;
         Ok(Self {
             name: header.name,
             fps: header.fps,
@@ -202,11 +202,15 @@ fn read_header(bytes: &[u8]) -> Result<Header, String> {
     Ok(header)
 }
 
-fn poses(positions: &[Vec<f64>], rotations: &[Vec<f64>]) -> Vec<Vec<Isometry3<f64>>> {
+fn poses(
+    positions: &[Vec<f64>],
+    rotations: &[Vec<f64>],
+) -> Result<Vec<Vec<Isometry3<f64>>>, String> {
     let pose = |(p, r): (&[f64], &[f64])| {
         let shift = Translation3::from(Vector3::from_column_slice(p));
-        let turn = UnitQuaternion::new_normalize(Quaternion::new(r[0], r[1], r[2], r[3]));
-        Isometry3::from_parts(shift, turn)
+        let turn = stored_rotation(Quaternion::new(r[0], r[1], r[2], r[3]));
+        let turn = turn.ok_or("the rotation of a body is zero")?;
+        Ok(Isometry3::from_parts(shift, turn))
     };
     positions
         .iter()
