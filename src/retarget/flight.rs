@@ -6,6 +6,7 @@
 
 use super::goals::Goals;
 use super::model::Model;
+use super::solve::carried;
 use super::stance::{Anchor, TOUCHES, carries};
 use crate::clip::{Problem, Severity};
 use crate::humanoid::Slot;
@@ -36,6 +37,13 @@ pub(super) struct Lift {
     pub flies: bool,
 }
 
+impl Lift {
+    pub fn apply(&self, qpos: &mut [f64]) {
+        let root = qpos.iter_mut().zip(&self.shift);
+        root.for_each(|(x, by)| *x += by);
+    }
+}
+
 /// A trajectory of poses and what stands in it.
 pub(super) struct Air<'a> {
     pub model: &'a Model<'a>,
@@ -46,28 +54,38 @@ pub(super) struct Air<'a> {
     pub fps: f64,
 }
 
-/// Indices of the last frame on the ground before a flight and the first after it.
-type Span = (i64, i64);
+/// A flight.
+#[derive(Clone, Debug)]
+pub(super) struct Flight {
+    /// Indices of the last frame on the ground before it and of the first after it.
+    pub span: (i64, i64),
+    /// Frames on the ground before and after it.
+    room: [i64; 2],
+}
 
 impl Air<'_> {
-    /// How every frame is to be moved so that flights follow gravity; `None` where it stays.
-    pub fn lifts(&self) -> Vec<Option<Lift>> {
-        let bodies: Vec<_> = self
-            .frames
-            .iter()
-            .map(|q| self.model.skeleton.forward(q))
-            .collect();
-        let com: Vec<_> = bodies.iter().map(|b| self.model.skeleton.com(b)).collect();
-        let low: Vec<_> = bodies
-            .iter()
-            .map(|b| self.model.skeleton.lowest_point(b))
-            .collect();
+    /// All flights, with how every frame is to be moved so that they follow gravity; `None` where it stays.
+    pub fn lifts(&self) -> (Vec<Flight>, Vec<Option<Lift>>) {
+        let skeleton = self.model.skeleton;
+        let bodies: Vec<_> = self.frames.iter().map(|q| skeleton.forward(q)).collect();
+        let com: Vec<_> = bodies.iter().map(|b| skeleton.com(b)).collect();
+        let low: Vec<_> = bodies.iter().map(|b| skeleton.lowest_point(b)).collect();
+        let mut flights = self.flights(&low);
+        flights.retain(|flight| self.shifts(flight.span, |f| com[f]).is_some());
+        let lifts = self.lifts_of(&flights);
+        (flights, lifts)
+    }
+
+    /// How every frame is to be moved so that these flights follow gravity.
+    pub fn lifts_of(&self, flights: &[Flight]) -> Vec<Option<Lift>> {
+        let skeleton = self.model.skeleton;
+        let com = |f: usize| skeleton.com(&skeleton.forward(&self.frames[f]));
         let mut lifts = vec![None; self.frames.len()];
-        for (span, room) in self.flights(&low) {
-            let Some(shifts) = self.shifts(span, &com) else {
+        for flight in flights {
+            let Some(shifts) = self.shifts(flight.span, com) else {
                 continue;
             };
-            for (index, lift) in self.with_ends(span, room, &shifts) {
+            for (index, lift) in self.with_ends(flight, &shifts) {
                 if let Some((n, f)) = self.locate(index) {
                     let back = self.offset(n).rotation.inverse();
                     let shift = back * lift.shift;
@@ -79,20 +97,29 @@ impl Air<'_> {
     }
 
     /// Cycle number and frame of an index; `None` before the first and after the last frame of what doesn't repeat.
-    fn locate(&self, index: i64) -> Option<(i64, usize)> {
+    pub fn locate(&self, index: i64) -> Option<(i64, usize)> {
         let count = self.frames.len() as i64;
         let (n, f) = (index.div_euclid(count), index.rem_euclid(count));
         (n == 0 || self.cycle.is_some()).then_some((n, f as usize))
     }
 
     /// What carries the first cycle to cycle number `n`.
-    fn offset(&self, n: i64) -> Isometry3<f64> {
+    pub fn offset(&self, n: i64) -> Isometry3<f64> {
         self.cycle
             .map_or_else(Isometry3::identity, |cycle| cycle.offset(n))
     }
 
-    /// All flights that begin in the frames, each with the frames on the ground before and after it.
-    fn flights(&self, low: &[f64]) -> Vec<(Span, [i64; 2])> {
+    /// The pose of an index, where its cycle has it.
+    pub fn pose(&self, index: i64) -> Option<Vec<f64>> {
+        let (n, f) = self.locate(index)?;
+        let by = self.offset(n);
+        let turn = by.rotation.to_rotation_matrix();
+        let at = by.translation.vector;
+        Some(carried(&self.frames[f], turn.matrix(), &at))
+    }
+
+    /// All flights that begin in the frames.
+    fn flights(&self, low: &[f64]) -> Vec<Flight> {
         let leg = self.model.skeleton.leg_length();
         let touches = |f: usize| self.anchors[f].iter().any(|a| a.weight >= TOUCHES);
         let up: Vec<bool> = (0..low.len())
@@ -108,22 +135,29 @@ impl Air<'_> {
         let starts = (0..count).filter(begins);
         let whole = starts.map(|a| (a, a + 1 + run(a + 1, 1, true)));
         let known = whole.filter(|(a, b)| b - a <= count && is_up(*b) == Some(false));
-        let high = |(a, b): &Span| {
+        let high = |(a, b): &(i64, i64)| {
             let mut heights = (a + 1..*b).filter_map(|i| self.locate(i));
             (b - a) as f64 >= SHORTEST * self.fps && heights.any(|(_, f)| low[f] > HIGH * leg)
         };
         let flights = known.filter(high);
         flights
-            .map(|(a, b)| ((a, b), [run(a, -1, false), run(b, 1, false)]))
+            .map(|(a, b)| Flight {
+                span: (a, b),
+                room: [run(a, -1, false), run(b, 1, false)],
+            })
             .collect()
     }
 
     /// From the frame before the flight to the one after it: how far the centre of mass is from its parabola; `None` if
     /// so far that it is no flight.
-    fn shifts(&self, (a, b): Span, com: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+    fn shifts(
+        &self,
+        (a, b): (i64, i64),
+        com: impl Fn(usize) -> Vector3<f64>,
+    ) -> Option<Vec<Vector3<f64>>> {
         let place = |index: i64| {
             let (n, f) = self.locate(index)?;
-            Some((self.offset(n) * Point3::from(com[f])).coords)
+            Some((self.offset(n) * Point3::from(com(f))).coords)
         };
         let (start, end) = (place(a)?, place(b)?);
         let duration = (b - a) as f64 / self.fps;
@@ -141,59 +175,61 @@ impl Air<'_> {
         (farthest <= most).then_some(shifts)
     }
 
-    /// A flight's moves, and before and after it those that lead to and from their speed: the cubic that begins at rest
-    /// and comes back with that speed. A stance between two flights is shared by them.
-    fn with_ends(&self, (a, b): Span, room: [i64; 2], shifts: &[Vector3<f64>]) -> Vec<(i64, Lift)> {
+    /// A flight's moves, and before and after it those that lead to and from their speed.
+    fn with_ends(&self, flight: &Flight, shifts: &[Vector3<f64>]) -> Vec<(i64, Lift)> {
         let last = shifts.len() - 1;
+        let lift = |shift, flies| Lift { shift, flies };
+        let ends = self.ends(flight);
+        let ends = ends.into_iter().map(|(index, end, share)| {
+            let next = [shifts[1], shifts[last - 1]][end];
+            (index, lift(next * share, false))
+        });
+        let flying = shifts.iter().enumerate().take(last).skip(1);
+        let flying = flying.map(|(i, shift)| (flight.span.0 + i as i64, lift(*shift, true)));
+        ends.chain(flying).collect()
+    }
+
+    /// Frames before (0) and after (1) a flight in which the body takes up its speed and leaves it again: how far it
+    /// goes there, as a multiple of the way in the frame next to the ground. That is the cubic that begins at rest and
+    /// comes back with that speed. A stance between two flights is shared by them.
+    pub fn ends(&self, flight: &Flight) -> Vec<(i64, usize, f64)> {
         let longest = (GATHERS * self.fps).round();
-        let ends = [(a, -1, shifts[1]), (b, 1, shifts[last - 1])];
-        let mut lifts = Vec::new();
-        for ((from, step, next), room) in ends.into_iter().zip(room) {
-            let width = longest.min(room as f64 / 2.0);
+        let (a, b) = flight.span;
+        let mut found = Vec::new();
+        for (end, (from, step)) in [(a, -1), (b, 1)].into_iter().enumerate() {
+            let width = longest.min(flight.room[end] as f64 / 2.0);
             for away in 1..width.ceil() as i64 {
                 let u = 1.0 - away as f64 / width;
-                // In time away from the ground the body moves by `next` a frame.
-                let shift = next * (-width * u * u * (1.0 - u));
-                lifts.push((
-                    from + step * away,
-                    Lift {
-                        shift,
-                        flies: false,
-                    },
-                ));
+                // In time away from the ground the body goes one such way a frame.
+                found.push((from + step * away, end, -width * u * u * (1.0 - u)));
             }
         }
-        let flying = shifts.iter().enumerate().take(last).skip(1);
-        lifts.extend(flying.map(|(i, shift)| {
-            (
-                a + i as i64,
-                Lift {
-                    shift: *shift,
-                    flies: true,
-                },
-            )
-        }));
-        lifts
+        found
     }
 }
 
-/// Moves the goals of a frame; where the body doesn't fly, what stands stays and its knee or elbow goes half the way.
+/// Moves the goals of a frame.
 pub(super) fn lift(model: &Model, goals: &mut Goals, f: usize, anchors: &[Anchor], lift: &Lift) {
     for (key, point) in goals.keys.iter().zip(&mut goals.points[f]) {
-        let end = match key.slot {
-            Slot::LeftLowerLeg => Slot::LeftFoot,
-            Slot::RightLowerLeg => Slot::RightFoot,
-            Slot::LeftLowerArm => Slot::LeftHand,
-            Slot::RightLowerArm => Slot::RightHand,
-            slot => slot,
-        };
-        let stands = !lift.flies && carries(model, end, anchors);
-        let share = match (stands, end == key.slot) {
-            (false, _) => 1.0,
-            (true, false) => 0.5,
-            (true, true) => 0.0,
-        };
-        *point += lift.shift * share;
+        *point += lift.shift * share(model, key.slot, anchors, lift.flies);
+    }
+}
+
+/// How far a body goes along when the whole is moved: where it doesn't fly, what stands stays and its knee or elbow goes
+/// half the way.
+pub(super) fn share(model: &Model, slot: Slot, anchors: &[Anchor], flies: bool) -> f64 {
+    let end = match slot {
+        Slot::LeftLowerLeg => Slot::LeftFoot,
+        Slot::RightLowerLeg => Slot::RightFoot,
+        Slot::LeftLowerArm => Slot::LeftHand,
+        Slot::RightLowerArm => Slot::RightHand,
+        slot => slot,
+    };
+    let stands = !flies && carries(model, end, anchors);
+    match (stands, end == slot) {
+        (false, _) => 1.0,
+        (true, false) => 0.5,
+        (true, true) => 0.0,
     }
 }
 
@@ -242,7 +278,7 @@ mod tests {
             cycle,
             fps: FPS,
         };
-        air.lifts()
+        air.lifts().1
     }
 
     fn moved(frames: &[Vec<f64>], lifts: &[Option<Lift>]) -> Vec<Vector3<f64>> {

@@ -7,6 +7,7 @@
 mod align;
 mod banded;
 mod cost;
+mod fit;
 mod flight;
 mod footing;
 mod goals;
@@ -20,6 +21,7 @@ mod rotation;
 mod seam;
 mod solve;
 mod source;
+mod spin;
 mod stance;
 mod swing;
 mod system;
@@ -30,12 +32,11 @@ pub use report::{MappedJoint, Report, Spread};
 use crate::clip::{Clip, LoopMode, MOST_FPS};
 use crate::humanoid::{self, HumanoidMap, NotHumanoid, Slot};
 use crate::motion::{Cycle, Draft, Motion};
-use crate::skeleton::{JointKind, Skeleton, limits};
-use cost::Problem;
+use crate::skeleton::{JointKind, Skeleton};
+use fit::{Fit, Fitted};
 use goals::Goals;
 use model::Model;
 use nalgebra::Vector3;
-use solve::Solver;
 use source::Source;
 use stance::{Anchor, Contacts};
 use std::ops::Range;
@@ -132,12 +133,20 @@ pub fn retarget(
         seam::close(&mut goals, cycle, &model, clip.fps);
     }
     let mut anchors = stance::plant(&model, &mut goals, &contacts, clip.fps, leg, cycle.as_ref());
-    let Solved {
+    let fit = Fit {
+        model: &model,
+        anchors: &anchors,
+        cycle: cycle.as_ref(),
+        fps: clip.fps,
+    };
+    let Fitted {
         frames: mut qpos,
         iterations,
         lifted,
-    } = solve(&model, &mut goals, &anchors, clip.fps, cycle.as_ref());
+        turned,
+    } = fit.run(&mut goals);
     problems.extend(flight::problem(lifted));
+    problems.extend(spin::problem(turned));
     goals.keep(&own);
     source.keep(&own);
     keep(&mut anchors, &own);
@@ -238,9 +247,6 @@ fn put_on_ground(
     contacts
 }
 
-/// Depth below the ground from which on a frame is solved again, metres.
-const DEEPEST: f64 = 0.004;
-
 /// Fewest steps in a cycle; a clip with fewer ends where it ends.
 const SHORTEST_CYCLE: usize = 4;
 
@@ -248,85 +254,6 @@ const STILL: Cycle = Cycle {
     translation: Vector3::new(0.0, 0.0, 0.0),
     heading: 0.0,
 };
-
-struct Solved {
-    frames: Vec<Vec<f64>>,
-    /// Steps of the first fit.
-    iterations: usize,
-    /// How far a flight was moved at most, metres.
-    lifted: f64,
-}
-
-/// Fits the trajectory, lets its flights follow gravity and brings it inside the joint limits.
-fn solve(
-    model: &Model,
-    goals: &mut Goals,
-    anchors: &[Vec<Anchor>],
-    fps: f64,
-    cycle: Option<&Cycle>,
-) -> Solved {
-    let mut frames = goals.guess.clone();
-    if cycle.is_some() {
-        frames.pop();
-    }
-    let iterations = Solver::new(&Problem::new(model, goals, anchors, fps), cycle).run(&mut frames);
-    let lifts = flight::Air {
-        model,
-        frames: &frames,
-        anchors,
-        cycle,
-        fps,
-    }
-    .lifts();
-    for (f, lift) in lifts.iter().enumerate() {
-        let Some(lift) = lift else { continue };
-        flight::lift(model, goals, f, &anchors[f], lift);
-        frames[f]
-            .iter_mut()
-            .zip(&lift.shift)
-            .for_each(|(x, by)| *x += by);
-    }
-    let problem = Problem::new(model, goals, anchors, fps);
-    if lifts.iter().any(Option::is_some) {
-        Solver::new(&problem, cycle).mend(&mut frames, |f, _| lifts[f].is_some());
-    }
-    mend(&problem, cycle, &mut frames);
-    if let (Some(cycle), Some(first)) = (cycle, frames.first()) {
-        let turn = rotation::exp(&(Vector3::z() * cycle.heading)).to_rotation_matrix();
-        let last = solve::carried(first, turn.matrix(), &cycle.translation);
-        frames.push(last);
-    }
-    let lifts = lifts.iter().flatten().filter(|lift| lift.flies);
-    Solved {
-        frames,
-        iterations,
-        lifted: lifts.map(|lift| lift.shift.norm()).fold(0.0, f64::max),
-    }
-}
-
-/// Solves again, more stiffly, where a coordinate is outside of its limits or a body below the ground.
-fn mend(problem: &Problem, cycle: Option<&Cycle>, frames: &mut [Vec<f64>]) {
-    // Clamping moves feet, so it should have nothing left to do.
-    let skeleton = problem.model.skeleton;
-    let is_wrong = |_: usize, qpos: &[f64]| {
-        limits::violations(skeleton, qpos) > 0
-            || skeleton.lowest_point(&skeleton.forward(qpos)) < -DEEPEST
-    };
-    let stiffer = cost::weight::STIFF_LIMITS.into_iter();
-    for (limit, ground) in stiffer.zip(cost::weight::STIFF_GROUND) {
-        if frames.iter().any(|qpos| is_wrong(0, qpos)) {
-            let stiff = Problem {
-                limit,
-                ground,
-                ..*problem
-            };
-            Solver::new(&stiff, cycle).mend(frames, is_wrong);
-        }
-    }
-    for qpos in frames {
-        limits::clamp(skeleton, qpos);
-    }
-}
 
 /// Height of the skeleton's ankles above its soles in its rest pose.
 fn ankle_height(skeleton: &Skeleton) -> f64 {

@@ -3,8 +3,10 @@ mod recorded;
 mod trimmed;
 mod windows;
 
+use super::cost::Problem;
 use super::goals::{Key, Turn};
 use super::model::put_quaternion;
+use super::solve::Solver;
 use super::stance::Anchor;
 use super::system::Window;
 use super::*;

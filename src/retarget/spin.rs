@@ -1,0 +1,243 @@
+//! Flights spin freely: while nothing touches the ground, the angular momentum about the centre of mass stays.
+//!
+//! The body is turned as it is, as a whole and about its centre of mass, by a rotation δ with
+//! I(t) δ̇ = L̄ − L(t) that is none at both ends of the flight: so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L.
+
+use super::flight::{Air, Flight, share};
+use super::goals::Goals;
+use super::model::{Model, put_quaternion, quaternion, vector};
+use super::stance::Anchor;
+use crate::clip::{Problem, Severity};
+use crate::skeleton::{Skeleton, Twist};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+
+/// Rotations don't add up as vectors do; with turns as small as these, each pass leaves a small part of the error.
+const PASSES: usize = 3;
+/// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
+const FARTHEST: f64 = 0.5;
+/// A flight that is turned further than this is told of, radians.
+const TOLD: f64 = 0.1;
+
+/// What happens from one frame to the next.
+struct Step {
+    /// Mean angular momentum, kg·m²/s.
+    momentum: Vector3<f64>,
+    /// Of the whole body's inertia about its centre of mass, 1/(kg·m²).
+    inverse_inertia: Matrix3<f64>,
+}
+
+/// How a body is turned about its centre of mass, and whether it flies there; elsewhere it keeps its feet and hands on the
+/// ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Turn {
+    pub by: UnitQuaternion<f64>,
+    pub flies: bool,
+}
+
+impl Turn {
+    pub fn apply(&self, skeleton: &Skeleton, qpos: &mut [f64]) {
+        turn(skeleton, qpos, &self.by);
+    }
+}
+
+/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `None` where it
+/// stays.
+pub(super) fn turns(air: &Air, flights: &[Flight]) -> Vec<Option<Turn>> {
+    let mut turns = vec![None; air.frames.len()];
+    for flight in flights {
+        let (a, b) = flight.span;
+        let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
+        let Some(found) = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps)) else {
+            continue;
+        };
+        for (index, turn) in with_ends(air, flight, &found) {
+            if let Some((n, f)) = air.locate(index) {
+                let heading = air.offset(n).rotation;
+                let by = heading.inverse() * turn.by * heading;
+                turns[f] = Some(Turn { by, ..turn });
+            }
+        }
+    }
+    turns
+}
+
+/// A flight's turns, and before and after it those that lead to and from their speed.
+fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(i64, Turn)> {
+    let last = turns.len() - 1;
+    let turn = |by, flies| Turn { by, flies };
+    let ends = air.ends(flight).into_iter().map(|(index, end, share)| {
+        let next = [turns[1], turns[last - 1]][end].scaled_axis();
+        let by = UnitQuaternion::from_scaled_axis(next * share);
+        (index, turn(by, false))
+    });
+    let flying = turns.iter().enumerate().take(last).skip(1);
+    let flying = flying.map(|(i, by)| (flight.span.0 + i as i64, turn(*by, true)));
+    ends.chain(flying).collect()
+}
+
+/// The turns of a flight, from the last frame on the ground to the first after it.
+fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<UnitQuaternion<f64>>> {
+    let mut turns = vec![UnitQuaternion::identity(); frames.len()];
+    for _ in 0..PASSES {
+        let mut turned = frames.to_vec();
+        let pairs = turned.iter_mut().zip(&turns);
+        pairs.for_each(|(qpos, by)| turn(skeleton, qpos, by));
+        let steps = turned.windows(2).map(|pair| step(skeleton, pair, fps));
+        let steps: Vec<Step> = steps.collect::<Option<_>>()?;
+        let ease: Matrix3<f64> = steps.iter().map(|s| s.inverse_inertia).sum();
+        let spun: Vector3<f64> = steps.iter().map(|s| s.inverse_inertia * s.momentum).sum();
+        let kept = ease.try_inverse()? * spun;
+        let mut angle = Vector3::zeros();
+        for (step, turn) in steps.iter().zip(&mut turns[1..]) {
+            angle += step.inverse_inertia * (kept - step.momentum) / fps;
+            *turn = UnitQuaternion::from_scaled_axis(angle) * *turn;
+        }
+    }
+    let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
+    (farthest <= FARTHEST).then_some(turns)
+}
+
+fn step(skeleton: &Skeleton, pair: &[Vec<f64>], fps: f64) -> Option<Step> {
+    let qvel = skeleton.differentiate(&pair[0], &pair[1], 1.0 / fps);
+    let momentum = |qpos: &Vec<f64>| {
+        let poses = skeleton.forward(qpos);
+        skeleton.momentum(&poses, &skeleton.twists(qpos, &qvel)).1
+    };
+    Some(Step {
+        momentum: (momentum(&pair[0]) + momentum(&pair[1])) / 2.0,
+        inverse_inertia: inertia(skeleton, &skeleton.forward(&pair[0])).try_inverse()?,
+    })
+}
+
+/// The whole body's inertia about its centre of mass, world axes: a column is the momentum of a turn at 1 rad/s.
+fn inertia(skeleton: &Skeleton, poses: &[Isometry3<f64>]) -> Matrix3<f64> {
+    let com = skeleton.com(poses);
+    let column = |axis: Vector3<f64>| {
+        let twist = |pose: &Isometry3<f64>| Twist {
+            linear: axis.cross(&(pose.translation.vector - com)),
+            angular: axis,
+        };
+        let twists: Vec<Twist> = poses.iter().map(twist).collect();
+        skeleton.momentum(poses, &twists).1
+    };
+    Matrix3::from_columns(&[Vector3::x(), Vector3::y(), Vector3::z()].map(column))
+}
+
+/// Turns a pose about its centre of mass.
+fn turn(skeleton: &Skeleton, qpos: &mut [f64], by: &UnitQuaternion<f64>) {
+    let com = skeleton.com(&skeleton.forward(qpos));
+    let root = com + by * (vector(qpos, 0) - com);
+    qpos[..3].copy_from_slice(root.as_slice());
+    put_quaternion(qpos, 3, &(by * quaternion(qpos, 3)));
+}
+
+/// Turns the goals of a frame about the centre of mass of its pose.
+pub(super) fn turn_goals(
+    model: &Model,
+    goals: &mut Goals,
+    f: usize,
+    anchors: &[Anchor],
+    (qpos, turn): (&[f64], &Turn),
+) {
+    let com = model.skeleton.com(&model.skeleton.forward(qpos));
+    for (key, point) in goals.keys.iter().zip(&mut goals.points[f]) {
+        let moved = com + turn.by * (*point - com);
+        *point = point.lerp(&moved, share(model, key.slot, anchors, turn.flies));
+    }
+}
+
+/// Tells of flights that were turned far.
+pub(super) fn problem(turned: f64) -> Option<Problem> {
+    (turned > TOLD).then(|| Problem {
+        id: "spin-corrected".to_owned(),
+        severity: Severity::Note,
+        message: format!(
+            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air; the distance from the source's joints has that in it",
+            turned.to_degrees()
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::Model;
+    use super::*;
+
+    const FPS: f64 = 60.0;
+    const FLIES: i64 = 30;
+    /// Frames on the ground before and after.
+    const GATHERS: i64 = 20;
+
+    /// The humanoid at rest on the ground, then in the air, where it rocks, swings an arm and turns aside, then at rest
+    /// on the ground again.
+    fn leap(skeleton: &Skeleton) -> Vec<Vec<f64>> {
+        let arm = skeleton.bodies.iter().find(|b| b.name == "right_upper_arm");
+        let at = arm.expect("an arm").joints[0].qpos;
+        let frame = |f: i64| {
+            let u = (f as f64 / FLIES as f64).clamp(0.0, 1.0);
+            let mut qpos = skeleton.rest_qpos();
+            let low = skeleton.lowest_point(&skeleton.forward(&qpos));
+            let duration = FLIES as f64 / FPS;
+            qpos[2] += crate::motion::GRAVITY * duration * duration * u * (1.0 - u) / 2.0 - low;
+            let wave = (std::f64::consts::PI * u).sin();
+            let root = UnitQuaternion::from_euler_angles(0.1 * wave, 0.2 * wave * wave, 0.6 * u);
+            put_quaternion(&mut qpos, 3, &root);
+            let swing = UnitQuaternion::from_euler_angles(0.0, -1.5 * wave, 0.0);
+            put_quaternion(&mut qpos, at, &swing);
+            qpos
+        };
+        (-GATHERS..FLIES + GATHERS + 1).map(frame).collect()
+    }
+
+    #[test]
+    fn the_momentum_of_a_flight_stays() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+        let still = leap(&skeleton);
+        let air = Air {
+            model: &Model::new(&skeleton),
+            frames: &still,
+            anchors: &vec![Vec::new(); still.len()],
+            cycle: None,
+            fps: FPS,
+        };
+        let (flights, _) = air.lifts();
+        let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
+        assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
+        let found = turns(&air, &flights);
+        let mut frames = still.clone();
+        for (qpos, turned) in frames.iter_mut().zip(&found) {
+            let Some(Turn { by, .. }) = turned else {
+                continue;
+            };
+            turn(&skeleton, qpos, by);
+        }
+        let momenta = |frames: &[Vec<f64>]| -> Vec<Vector3<f64>> {
+            let steps = frames.windows(2).map(|pair| step(&skeleton, pair, FPS));
+            steps.map(|step| step.expect("a step").momentum).collect()
+        };
+        let flying = GATHERS as usize..(GATHERS + FLIES) as usize;
+        let spread = |momenta: &[Vector3<f64>]| {
+            let momenta = &momenta[flying.clone()];
+            let mean = momenta.iter().sum::<Vector3<f64>>() / momenta.len() as f64;
+            momenta
+                .iter()
+                .map(|l| (l - mean).norm())
+                .fold(0.0, f64::max)
+        };
+        let (before, after) = (momenta(&still), momenta(&frames));
+        assert!(spread(&before) > 1.0 && spread(&after) < 1e-3 * spread(&before));
+        // What changes its spin in the air has led to it on the ground.
+        let leaves = |momenta: &[Vector3<f64>]| momenta[flying.start] - momenta[flying.start - 1];
+        let change = (leaves(&after) - leaves(&before)).norm();
+        let in_the_air = (after[flying.start] - before[flying.start]).norm();
+        assert!(change < 0.5 * in_the_air, "{change} of {in_the_air}");
+        let com = |frames: &[Vec<f64>], f: usize| skeleton.com(&skeleton.forward(&frames[f]));
+        for f in 0..frames.len() {
+            assert!((com(&frames, f) - com(&still, f)).norm() < 1e-9, "{f}");
+        }
+        for f in [0, flying.start, flying.end, frames.len() - 1] {
+            let apart = frames[f].iter().zip(&still[f]).map(|(a, b)| (a - b).abs());
+            assert!(apart.fold(0.0, f64::max) < 1e-9, "{f}");
+        }
+    }
+}
