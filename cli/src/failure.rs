@@ -39,6 +39,14 @@ impl Failure {
         Self::Work(WorkError(one_line(message)))
     }
 
+    /// Failed work, with what to do about it.
+    pub fn with_remedy(self, remedy: impl Display) -> Self {
+        match self {
+            Self::Work(WorkError(message)) => Self::work(format!("{message}; {remedy}")),
+            other => other,
+        }
+    }
+
     /// An input error about one file. The file is named once, also where the cause names it already.
     pub fn input(path: &Path, cause: impl Display) -> Self {
         let cause = without_name(path, &cause.to_string());

@@ -6,7 +6,7 @@ use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::clip::LoopMode;
-use mimic::evaluate::{self, Evaluation, Options, Start};
+use mimic::evaluate::{self, Evaluation, Options, Start, Trace};
 use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
 use mimic::motion::MotionError;
 use serde::Serialize;
@@ -98,17 +98,58 @@ pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
     })?;
     let trace =
         evaluate::play(&performer, which, Start::At(0.0), seconds, None).map_err(learn_failure)?;
+    shown(run, &motion.name, which, &performer, &trace)
+}
+
+fn shown(
+    run: &Run,
+    name: &str,
+    which: usize,
+    performer: &Performer,
+    trace: &Trace,
+) -> Outcome<Recording> {
     if trace.frames.is_empty() {
         return Err(Failure::work(
             "the agent fails in its first step, there is nothing to show; train it longer",
         ));
     }
-    Ok(Recording::of_trace(
-        &motion.name,
-        &trace,
-        motion,
-        performer.stage(),
-    ))
+    let motion = &run.motions()[which];
+    Ok(Recording::of_trace(name, trace, motion, performer.stage()))
+}
+
+/// The agent's performance of several of its motions, one after the other, each for `seconds` or to its end.
+pub fn record_sequence(run: &Run, names: &[String], seconds: f64) -> Outcome<Recording> {
+    let which: Vec<usize> = names
+        .iter()
+        .map(|name| number_of(run, name))
+        .collect::<Outcome<_>>()?;
+    let performer: Performer = run.performer().map_err(failure)?;
+    let trace = evaluate::play_sequence(&performer, &which, seconds).map_err(learn_failure)?;
+    shown(run, &names.join("-"), which[0], &performer, &trace)
+}
+
+/// The motion of a run that a name means: its whole name, or a part that no other has.
+fn number_of(run: &Run, name: &str) -> Outcome<usize> {
+    let motions = run.motions();
+    if let Some(exact) = motions.iter().position(|m| m.name == name) {
+        return Ok(exact);
+    }
+    let mut with = (0..motions.len()).filter(|&i| motions[i].name.contains(name));
+    match (with.next(), with.next()) {
+        (Some(only), None) => Ok(only),
+        (found, _) => {
+            let known: Vec<&str> = motions.iter().map(|m| m.name.as_str()).collect();
+            let what = match found {
+                Some(_) => "several motions whose names have",
+                None => "no motion",
+            };
+            Err(Failure::user(format!(
+                "`{}` learned {what} `{name}`; its motions are {}",
+                run.dir().display(),
+                known.join(", ")
+            )))
+        }
+    }
 }
 
 /// Whose fault a failed run is: a file that can't be written is the work's, one that can't be read the user's.

@@ -4,7 +4,8 @@ use crate::clip::LoopMode;
 use crate::learn::{LearnError, Memory, Performer};
 use crate::sim::LinkState;
 use crate::task::{
-    Dynamics, Failure, Outcome, Perturbations, Sample, Setting, Stage, Terminations, Terms,
+    Dynamics, Failure, Imitate, Outcome, Perturbations, Reference, Sample, Setting, Stage,
+    Terminations, Terms,
 };
 use nalgebra::{Point3, Vector3};
 
@@ -67,22 +68,9 @@ pub fn play(
     seconds: f64,
     disturbed: Option<(Perturbations, u64)>,
 ) -> Result<Trace, LearnError> {
-    let rules = Terminations {
-        distance: None,
-        fall: true,
-        reward: None,
-    };
-    let reference = &performer.references()[which];
-    let episode_s = match reference.loop_mode() {
-        LoopMode::Wrap => seconds,
-        LoopMode::Clamp => reference.duration() + 1.0,
-    };
-    let setting = Setting {
-        terminations: rules,
-        episode_s,
-        perturbations: disturbed.map_or_else(Perturbations::default, |(ranges, _)| ranges),
-        ..*performer.setting()
-    };
+    let ranges = disturbed.map_or_else(Perturbations::default, |(ranges, _)| ranges);
+    let seconds = episode_s(&performer.references()[which], seconds);
+    let setting = rules(performer, seconds, ranges);
     let mut env = performer.environment(which, &setting);
     match start {
         Start::At(share) => env.reset(share * env.last_start()),
@@ -91,49 +79,114 @@ pub fn play(
     if let Some((_, seed)) = disturbed {
         env.perturb(seed);
     }
-    let mut trace = Trace {
-        start,
-        control_hz: setting.physics.control_hz,
-        frames: Vec::new(),
-        possible: env.possible_steps() as usize,
-        survived: 0,
-        largest_momentum: reference.largest_momentum(),
-        failure: None,
-        contact_links: reference.contact_links.clone(),
-    };
+    let mut trace = Trace::new(performer, which, start, &env);
     let mut memory = Memory::default();
-    loop {
-        let action = performer.act(&env, &mut memory)?;
-        let step = env.step(action);
-        let mut sample = reference.blank();
-        reference.sample(env.time(), &mut sample);
-        trace.failure = match step.outcome {
-            Outcome::Failed(failure) => Some(failure),
-            _ if mean_distance(performer.stage(), env.states(), &sample.links) > LOST_M => {
-                Some(Failure::Distance)
+    while trace.advance(performer, &mut env, &mut memory)? == Outcome::Running {}
+    Ok(trace)
+}
+
+/// Plays the references of these numbers one after the other, each for `seconds` or to its end, and each from where the
+/// one before has led. It ends early with a failure, as in [`play`].
+///
+/// # Errors
+/// A task of another shape than the policy's.
+pub fn play_sequence(
+    performer: &Performer,
+    which: &[usize],
+    seconds: f64,
+) -> Result<Trace, LearnError> {
+    let setting = rules(performer, f64::MAX, Perturbations::default());
+    let first = which.first().copied().unwrap_or(0);
+    let mut env = performer.environment(first, &setting);
+    let mut trace = Trace::new(performer, first, Start::At(0.0), &env);
+    trace.possible = 0;
+    let mut memory = Memory::default();
+    for (part, &number) in which.iter().enumerate() {
+        let reference = &performer.references()[number];
+        if part > 0 {
+            env.change_to(reference);
+        }
+        let steps = episode_s(reference, seconds) * setting.physics.control_hz;
+        let steps = steps.round().clamp(1.0, env.possible_steps()) as usize;
+        trace.possible += steps;
+        for _ in 0..steps {
+            trace.advance(performer, &mut env, &mut memory)?;
+            if trace.failure.is_some() {
+                return Ok(trace);
             }
-            _ => None,
+        }
+    }
+    Ok(trace)
+}
+
+/// Length of an episode, with room for the end of a motion that has one.
+fn episode_s(reference: &Reference, seconds: f64) -> f64 {
+    match reference.loop_mode() {
+        LoopMode::Wrap => seconds,
+        LoopMode::Clamp => reference.duration() + 1.0,
+    }
+}
+
+/// The performer's task under the rules of evaluation.
+fn rules(performer: &Performer, episode_s: f64, perturbations: Perturbations) -> Setting {
+    Setting {
+        terminations: Terminations {
+            distance: None,
+            fall: true,
+            reward: None,
+        },
+        episode_s,
+        perturbations,
+        ..*performer.setting()
+    }
+}
+
+impl Trace {
+    fn new(performer: &Performer, which: usize, start: Start, env: &Imitate) -> Self {
+        let reference = &performer.references()[which];
+        Trace {
+            start,
+            control_hz: performer.setting().physics.control_hz,
+            frames: Vec::new(),
+            possible: env.possible_steps() as usize,
+            survived: 0,
+            largest_momentum: reference.largest_momentum(),
+            failure: None,
+            contact_links: reference.contact_links.clone(),
+        }
+    }
+
+    /// Acts for one control step and keeps the frame; an episode that failed by its distance goes no further.
+    fn advance(
+        &mut self,
+        performer: &Performer,
+        env: &mut Imitate,
+        memory: &mut Memory,
+    ) -> Result<Outcome, LearnError> {
+        let step = env.step(performer.act(env, memory)?);
+        let mut reference = env.blank();
+        env.wanted(&mut reference);
+        let far = mean_distance(performer.stage(), env.states(), &reference.links) > LOST_M;
+        let outcome = match step.outcome {
+            Outcome::Failed(failure) => Outcome::Failed(failure),
+            _ if far => Outcome::Failed(Failure::Distance),
+            outcome => outcome,
         };
-        trace.frames.push(Frame {
+        let contact = |&link: &usize| env.contacts()[link];
+        self.frames.push(Frame {
             time: env.time(),
             agent: env.states().to_vec(),
-            reference: sample,
+            reference,
             dynamics: *env.dynamics(),
-            contacts: trace
-                .contact_links
-                .iter()
-                .map(|&link| env.contacts()[link])
-                .collect(),
+            contacts: self.contact_links.iter().map(contact).collect(),
             terms: step.terms,
             reward: step.reward,
         });
-        if trace.failure.is_some() {
-            return Ok(trace);
+        match outcome {
+            Outcome::Failed(failure) => self.failure = Some(failure),
+            _ => self.survived += 1,
         }
-        trace.survived += 1;
-        if step.outcome != Outcome::Running {
-            return Ok(trace);
-        }
+        Ok(outcome)
     }
 }
 

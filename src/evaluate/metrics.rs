@@ -4,7 +4,7 @@ use super::episode::{Frame, Start, Trace, positions};
 use crate::motion::skate;
 use crate::sim::{Link, LinkState};
 use crate::skeleton::Twist;
-use crate::task::Stage;
+use crate::task::{Failure, Stage};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -41,12 +41,37 @@ pub struct Evaluation {
     pub root_rotation_turned_rad: f64,
     /// How far the reference turned about it.
     pub root_rotation_reference_rad: f64,
+    /// The episodes that failed.
+    #[serde(default)]
+    pub failures: Vec<Failed>,
     /// One more episode, from standing still in the rest pose.
     #[serde(default)]
     pub from_rest: Option<Digest>,
     /// The same phases again, disturbed.
     #[serde(default)]
     pub perturbed: Option<Digest>,
+}
+
+/// An episode that failed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Failed {
+    /// Where in the motion it started, as a share of it.
+    pub start: f64,
+    pub survived_s: f64,
+    pub failure: Failure,
+}
+
+impl Failed {
+    fn of(trace: &Trace) -> Option<Self> {
+        let Start::At(start) = trace.start else {
+            return None;
+        };
+        Some(Self {
+            start,
+            survived_s: trace.survived as f64 / trace.control_hz,
+            failure: trace.failure?,
+        })
+    }
 }
 
 /// The fields of an [`Evaluation`] that count where an agent has more to do than to track.
@@ -114,6 +139,7 @@ pub fn measure(stage: &Stage, traces: &[Trace]) -> Evaluation {
         }),
         root_rotation_turned_rad: from_start(&|t| turned(t, |f| &f.agent[0])),
         root_rotation_reference_rad: from_start(&|t| turned(t, |f| &f.reference.links[0])),
+        failures: traces.iter().filter_map(Failed::of).collect(),
         from_rest: None,
         perturbed: None,
     }

@@ -5,8 +5,8 @@ mod metrics;
 #[cfg(test)]
 mod tests;
 
-pub use episode::{Frame, Start, Trace, play};
-pub use metrics::{Digest, Evaluation, measure};
+pub use episode::{Frame, Start, Trace, play, play_sequence};
+pub use metrics::{Digest, Evaluation, Failed, measure};
 
 use crate::learn::{LearnError, Performer};
 use crate::task::Perturbations;

@@ -1,11 +1,11 @@
 //! Metrics of made-up traces against what their definitions say.
 
 use super::episode::{Frame, Start, Trace};
-use super::measure;
+use super::{Failed, measure};
 use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
 use crate::task::{Dynamics, Failure, Sample, Stage, Terms};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 fn stage() -> Stage {
     let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
@@ -133,6 +133,12 @@ fn failures_cost_survival_and_success() {
     close(found.survival_from_start, 1.0, "survival from the start");
     close(found.success_mean_0_5, 0.5, "success");
     close(found.normalized_return, 0.75, "normalised return");
+    let failed = Failed {
+        start: 0.5,
+        survived_s: 0.4,
+        failure: Failure::Fall,
+    };
+    assert_eq!(found.failures, [failed]);
 }
 
 #[test]

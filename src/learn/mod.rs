@@ -20,6 +20,7 @@ mod presets;
 mod random;
 mod rollout;
 mod run;
+mod starts;
 mod stats;
 mod surrogate;
 #[cfg(test)]

@@ -81,6 +81,7 @@ fn deepmimic() -> Plan {
             },
             perturbations: Perturbations::default(),
             start_anywhere: true,
+            adaptive_starts: 0.0,
             episode_s: 20.0,
         },
         // Section 6; noise and rates as in the authors' program, for they go together: a policy's gradient grows as its
@@ -148,6 +149,7 @@ fn booth2020() -> Plan {
             // "We can do without it."
             perturbations: Perturbations::default(),
             start_anywhere: false,
+            adaptive_starts: 0.0,
             episode_s: 25.0,
         },
         ppo: Config {

@@ -1,7 +1,21 @@
-//! Where a random stream stands, so that a resumed run goes on with the same numbers.
+//! Random streams, and where one stands, so that a resumed run goes on with the same numbers.
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// The random stream `number` of a seed, at its `round`th part.
+pub(super) fn stream(seed: u64, number: u64, round: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(number);
+    // Far more numbers than one round can use.
+    rng.set_word_pos(u128::from(round) << 40);
+    rng
+}
+
+/// Uniform in [0, 1), from the upper 53 bits.
+pub(super) fn uniform(rng: &mut ChaCha8Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
 
 /// The state of a [`ChaCha8Rng`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +72,6 @@ impl RngState {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_chacha::rand_core::Rng;
 
     #[test]
     fn a_restored_stream_goes_on_where_it_was() {

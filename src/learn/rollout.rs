@@ -3,6 +3,8 @@
 //! A group is the unit of parallel work. Which environments it holds depends on the configuration alone, never on
 //! the number of threads, and every environment has its own random stream: so the samples are the same everywhere.
 
+use super::random::stream;
+use super::starts::{Place, Starts, Tally};
 use super::{ActWorkspace, FrozenNormalizer, LearnError, Policy, StepEnd, fill_normal};
 use crate::task::{Imitate, Outcome, Reference, Setting, Stage, TERM_NAMES};
 use rand_chacha::ChaCha8Rng;
@@ -14,6 +16,7 @@ pub(super) struct Actor<'a> {
     pub policy: &'a Policy,
     pub parameters: &'a [f32],
     pub normalizer: &'a FrozenNormalizer<f32>,
+    pub starts: &'a Starts,
 }
 
 /// Samples of one iteration; `[steps, environments]` row-major, observations and actions a row more.
@@ -33,12 +36,14 @@ pub(super) struct Buffer {
     pub next_values: Vec<f32>,
     /// Every episode that ended.
     pub episodes: Vec<Episode>,
+    /// By the bins of [`Starts`].
+    pub tally: Tally,
     /// Sums over all steps, in the order of [`TERM_NAMES`].
     pub terms: [f64; TERM_NAMES.len()],
 }
 
 impl Buffer {
-    fn clear(&mut self) {
+    fn clear(&mut self, bins: usize) {
         for values in [
             &mut self.raw,
             &mut self.observations,
@@ -57,6 +62,7 @@ impl Buffer {
         }
         self.ends.clear();
         self.episodes.clear();
+        self.tally.clear(bins);
         self.terms = [0.0; TERM_NAMES.len()];
     }
 }
@@ -74,6 +80,8 @@ pub(super) struct Episode {
 /// One environment, its random stream and its running episode.
 struct Player {
     env: Imitate,
+    /// Which reference it imitates.
+    motion: usize,
     number: u64,
     rng: ChaCha8Rng,
     episode: Episode,
@@ -82,31 +90,28 @@ struct Player {
 /// Environments that step together.
 pub(super) struct Group {
     players: Vec<Player>,
+    references: Arc<[Arc<Reference>]>,
     /// Current raw observations, `[environments, observation]`.
     current: Vec<f32>,
     normal: Vec<f32>,
     noise: Vec<f32>,
     workspace: ActWorkspace<f32>,
-    start_anywhere: bool,
     pub buffer: Buffer,
 }
 
 impl Group {
-    /// Environments number `first` to `first + count`, which take the references in turn.
+    /// Environments number `first` to `first + count`.
     pub fn new(
         stage: &Arc<Stage>,
-        references: &[Arc<Reference>],
+        references: &Arc<[Arc<Reference>]>,
         setting: &Setting,
         first: usize,
         count: usize,
     ) -> Self {
         let players: Vec<Player> = (first..first + count)
             .map(|number| Player {
-                env: Imitate::new(
-                    stage.clone(),
-                    references[number % references.len()].clone(),
-                    setting,
-                ),
+                env: Imitate::new(stage.clone(), references[0].clone(), setting),
+                motion: 0,
                 number: number as u64,
                 rng: ChaCha8Rng::seed_from_u64(0),
                 episode: Episode::default(),
@@ -118,14 +123,14 @@ impl Group {
             normal: vec![0.0; count * width],
             noise: vec![0.0; count * players[0].env.action_size()],
             players,
+            references: references.clone(),
             workspace: ActWorkspace::default(),
-            start_anywhere: setting.start_anywhere,
             buffer: Buffer::default(),
         }
     }
 
     /// Starts every environment anew, from a random stream that `seed`, `round` and its number determine alone.
-    pub fn restart(&mut self, seed: u64, round: u64) {
+    pub fn restart(&mut self, seed: u64, round: u64, starts: &Starts) {
         let width = self.width();
         for (player, row) in self
             .players
@@ -133,14 +138,14 @@ impl Group {
             .zip(self.current.chunks_exact_mut(width))
         {
             player.rng = stream(seed, player.number + 1, round);
-            player.begin(self.start_anywhere);
+            player.begin(starts, &self.references);
             player.env.observe(row);
         }
     }
 
     /// Plays `steps` steps in every environment and keeps the samples.
     pub fn collect(&mut self, steps: usize, actor: &Actor) -> Result<(), LearnError> {
-        self.buffer.clear();
+        self.buffer.clear(actor.starts.bins());
         for _ in 0..steps {
             self.act(actor)?;
             self.step(actor)?;
@@ -192,7 +197,11 @@ impl Group {
         let first = self.buffer.actions.len() - self.noise.len();
         for (i, player) in self.players.iter_mut().enumerate() {
             let from = first + i * actions;
+            let bin = actor.starts.bin(player.place());
             let step = player.env.step(&self.buffer.actions[from..from + actions]);
+            self.buffer.tally.steps[bin] += 1;
+            self.buffer.tally.failures[bin] +=
+                u32::from(matches!(step.outcome, Outcome::Failed(_)));
             let row = &mut self.current[i * width..(i + 1) * width];
             player.env.observe(row);
             player.episode.reward += step.reward;
@@ -217,7 +226,7 @@ impl Group {
             self.buffer.final_values.push(final_value);
             if step.outcome != Outcome::Running {
                 self.buffer.episodes.push(player.episode);
-                player.begin(self.start_anywhere);
+                player.begin(actor.starts, &self.references);
                 player.env.observe(row);
             }
         }
@@ -226,13 +235,17 @@ impl Group {
 }
 
 impl Player {
-    fn begin(&mut self, anywhere: bool) {
-        let share = if anywhere {
-            uniform(&mut self.rng)
-        } else {
-            0.0
-        };
-        self.env.reset(share * self.env.last_start());
+    fn place(&self) -> Place {
+        Place {
+            motion: self.motion,
+            time: self.env.time(),
+        }
+    }
+
+    fn begin(&mut self, starts: &Starts, references: &[Arc<Reference>]) {
+        let Place { motion, time } = starts.draw(&mut self.rng);
+        self.motion = motion;
+        self.env.imitate(&references[motion], time);
         if self.env.is_perturbed() {
             self.env.perturb(self.rng.next_u64());
         }
@@ -241,18 +254,4 @@ impl Player {
             ..Episode::default()
         };
     }
-}
-
-/// The random stream `number` of a seed, at its `round`th part.
-pub(super) fn stream(seed: u64, number: u64, round: u64) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(number);
-    // Far more numbers than one round can use.
-    rng.set_word_pos(u128::from(round) << 40);
-    rng
-}
-
-/// Uniform in [0, 1), from the upper 53 bits.
-fn uniform(rng: &mut ChaCha8Rng) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }

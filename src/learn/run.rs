@@ -78,6 +78,8 @@ const CONFIG: &str = "config.json";
 const CHECKPOINT: &str = "checkpoint.safetensors";
 const POLICY: &str = "policy.safetensors";
 const METRICS: &str = "metrics.jsonl";
+/// Tensor of the checkpoint that says where episodes begin.
+const STARTS: &str = "starts";
 
 impl Run {
     /// Starts a run in `dir`.
@@ -188,12 +190,14 @@ impl Run {
                 iteration,
                 learner,
                 normalizer,
+                mut tensors,
                 ..
             } = Checkpoint::load(&path)?;
             trainer.restore(TrainerState {
                 iteration,
                 learner,
                 normalizer,
+                starts: tensors.remove(STARTS).unwrap_or_default(),
             })?;
         }
         self.trim_metrics(trainer.iteration())?;
@@ -209,6 +213,7 @@ impl Run {
             iteration,
             learner,
             normalizer,
+            starts,
         } = trainer.state();
         let policy = PolicyFile {
             spec: learner.spec.clone(),
@@ -229,7 +234,7 @@ impl Run {
             learner,
             normalizer,
             rngs: Default::default(),
-            tensors: Default::default(),
+            tensors: [(STARTS.to_owned(), starts)].into(),
             details: Value::Null,
         };
         checkpoint.save(&self.dir.join(CHECKPOINT))?;

@@ -1,10 +1,13 @@
 //! A training run: rollouts, advantages, updates, in iterations that read top to bottom.
 
-use super::rollout::{Actor, Buffer, Episode, Group, stream};
+use super::random::stream;
+use super::rollout::{Actor, Buffer, Episode, Group};
+use super::starts::{Span, Starts};
 use super::{
     Activation, Batch, Config, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT,
     PolicySpec, Trajectories, UpdateStats, advantages,
 };
+use crate::clip::LoopMode;
 use crate::motion::Motion;
 use crate::task::{Block, Reference, Setting, Stage, TERM_NAMES, TaskError, layout};
 use rayon::prelude::*;
@@ -61,7 +64,7 @@ impl Default for Plan {
 }
 
 impl Plan {
-    fn check(&self, motions: usize) -> Result<(), TrainError> {
+    fn check(&self) -> Result<(), TrainError> {
         for (name, value) in [
             ("environments", self.environments),
             ("group", self.group),
@@ -70,12 +73,6 @@ impl Plan {
             if value == 0 {
                 return Err(TrainError::Zero(name));
             }
-        }
-        if motions > self.environments {
-            return Err(TrainError::TooFewEnvironments {
-                motions,
-                environments: self.environments,
-            });
         }
         if !(self.final_std > 0.0 && self.final_std.is_finite()) {
             return Err(TrainError::FinalStd(self.final_std));
@@ -100,8 +97,6 @@ pub enum TrainError {
         "motions `{first}` and `{other}` put different bodies on the ground, and one policy sees the contacts of one set; train them apart"
     )]
     OtherContacts { first: String, other: String },
-    #[error("{environments} environments are too few for {motions} motions: each motion needs one")]
-    TooFewEnvironments { motions: usize, environments: usize },
     #[error(
         "final_std is {0}, and must be positive: it is the share of the action noise that is left at the end"
     )]
@@ -142,6 +137,8 @@ pub struct TrainerState {
     pub iteration: u64,
     pub learner: LearnerState<f32>,
     pub normalizer: Normalizer,
+    /// What was seen of each part of the motions, which decides where episodes begin.
+    pub starts: Vec<f32>,
 }
 
 /// A run in memory.
@@ -151,6 +148,7 @@ pub struct Trainer {
     normalizer: Normalizer,
     observation: Vec<Block>,
     groups: Vec<Group>,
+    starts: Starts,
     iteration: u64,
     /// The environments haven't begun yet, or stand where an earlier state left them.
     stale: bool,
@@ -173,8 +171,8 @@ impl Trainer {
     /// # Errors
     /// A plan or a motion that can't be trained.
     pub fn new(plan: Plan, stage: Stage, motions: &[Motion]) -> Result<Self, TrainError> {
-        plan.check(motions.len())?;
-        let references: Result<Vec<_>, _> = motions
+        plan.check()?;
+        let references: Result<Arc<[_]>, _> = motions
             .iter()
             .map(|motion| Reference::new(motion, &stage).map(Arc::new))
             .collect();
@@ -189,9 +187,8 @@ impl Trainer {
         };
         let learner = Learner::new(plan.ppo.clone(), spec, &mut stream(plan.seed, 0, 0))?;
         let stage = Arc::new(stage);
-        let starts: Vec<usize> = (0..plan.environments).step_by(plan.group).collect();
-        let groups = starts
-            .into_iter()
+        let groups = (0..plan.environments)
+            .step_by(plan.group)
             .map(|first| {
                 let count = plan.group.min(plan.environments - first);
                 Group::new(&stage, &references, &plan.task, first, count)
@@ -199,6 +196,7 @@ impl Trainer {
             .collect();
         Ok(Trainer {
             normalizer: Normalizer::new(learner.policy().spec().observation),
+            starts: starts(&references, &plan.task),
             control_dt: plan.task.physics.control_dt(),
             plan,
             learner,
@@ -252,6 +250,7 @@ impl Trainer {
             iteration: self.iteration,
             learner: self.learner.state().clone(),
             normalizer: self.normalizer.clone(),
+            starts: self.starts.state(),
         }
     }
 
@@ -260,7 +259,9 @@ impl Trainer {
     /// # Errors
     /// A state of another network.
     pub fn restore(&mut self, state: TrainerState) -> Result<(), LearnError> {
+        super::check_length("saved starts", state.starts.len(), 2 * self.starts.bins())?;
         self.learner.restore(state.learner)?;
+        self.starts.restore(&state.starts);
         self.normalizer = state.normalizer;
         self.iteration = state.iteration;
         self.stale = true;
@@ -283,6 +284,8 @@ impl Trainer {
         for group in &self.groups {
             self.normalizer.update(&group.buffer.raw)?;
         }
+        self.starts
+            .learn(self.groups.iter().map(|group| &group.buffer.tally));
         let batch = Batch {
             observations: &self.batch.observations,
             actions: &self.batch.actions,
@@ -342,13 +345,14 @@ impl Trainer {
             self.stale = false;
             self.groups
                 .par_iter_mut()
-                .for_each(|group| group.restart(seed, part));
+                .for_each(|group| group.restart(seed, part, &self.starts));
         }
         let normalizer = self.normalizer.frozen(OBSERVATION_LIMIT);
         let actor = Actor {
             policy: self.learner.policy(),
             parameters: self.learner.parameters(),
             normalizer: &normalizer,
+            starts: &self.starts,
         };
         let steps = self.plan.horizon;
         self.groups
@@ -423,6 +427,23 @@ impl Trainer {
             reward_terms: reward_terms.collect(),
         }
     }
+}
+
+/// Where episodes of these references begin.
+fn starts(references: &[Arc<Reference>], task: &Setting) -> Starts {
+    let control_dt = task.physics.control_dt();
+    let span = |reference: &Arc<Reference>| Span {
+        duration: reference.duration(),
+        last_start: reference.last_start(control_dt),
+        wraps: reference.loop_mode() == LoopMode::Wrap,
+    };
+    let spans: Vec<Span> = references.iter().map(span).collect();
+    Starts::new(
+        &spans,
+        task.start_anywhere,
+        task.adaptive_starts,
+        control_dt,
+    )
 }
 
 /// Contact links of the motions, which must be the same for all.

@@ -2,7 +2,7 @@
 
 use super::observe::{Scene, observation_size, observe};
 use super::perturb::Disturbance;
-use super::reference::{Reference, Sample};
+use super::reference::{Reference, Sample, anchor};
 use super::reward::{Terms, terms};
 use super::setting::{Actions, Setting};
 use super::stage::Stage;
@@ -11,7 +11,7 @@ use crate::clip::LoopMode;
 use crate::sim::{HingeAxis, LinkJoint, LinkState, Target, World};
 use crate::skeleton::Drive;
 use crate::task::Dynamics;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// How an episode stands after a step.
@@ -39,6 +39,8 @@ pub struct Step {
 pub struct Imitate {
     stage: Arc<Stage>,
     reference: Arc<Reference>,
+    /// Where the reference begins.
+    place: Isometry3<f32>,
     setting: Setting,
     world: World,
     time: f64,
@@ -64,6 +66,7 @@ impl Imitate {
             disturbance: None,
             stage,
             reference,
+            place: Isometry3::identity(),
             setting: *setting,
             time: 0.0,
             started: 0.0,
@@ -85,10 +88,42 @@ impl Imitate {
         self.stage.character.dof
     }
 
+    /// Starts an episode of `reference`, whose contact links are those of the one before.
+    pub fn imitate(&mut self, reference: &Arc<Reference>, time: f64) {
+        self.reference = reference.clone();
+        self.reset(time);
+    }
+
+    /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
+    /// and from where and whither the present one has brought the character.
+    pub fn change_to(&mut self, reference: &Arc<Reference>) {
+        let mut present = self.reference.blank();
+        self.wanted(&mut present);
+        let time = reference.nearest(&present);
+        let mut begun = reference.blank();
+        reference.sample(time, &mut begun);
+        self.place = anchor(&present.links[0].pose) * anchor(&begun.links[0].pose).inverse();
+        self.started += time - self.time;
+        self.time = time;
+        self.reference = reference.clone();
+        self.look_ahead();
+    }
+
+    /// A sample to write into.
+    pub fn blank(&self) -> Sample {
+        self.reference.blank()
+    }
+
+    /// Writes the reference at the present moment.
+    pub fn wanted(&self, sample: &mut Sample) {
+        self.reference.sample_at(&self.place, self.time, sample);
+    }
+
     /// Starts an episode in the reference's own state at `time` seconds.
     pub fn reset(&mut self, time: f64) {
         self.time = time;
         self.started = time;
+        self.place = Isometry3::identity();
         self.reference.sample(time, &mut self.next);
         self.world.reset(&self.next.links);
         self.dynamics = self.reference.masses().dynamics(self.world.states());
@@ -139,12 +174,7 @@ impl Imitate {
 
     /// Latest start that leaves something to do, seconds.
     pub fn last_start(&self) -> f64 {
-        match self.reference.loop_mode() {
-            LoopMode::Wrap => self.reference.duration(),
-            LoopMode::Clamp => {
-                (self.reference.duration() - 2.0 * self.setting.physics.control_dt()).max(0.0)
-            }
-        }
+        self.reference.last_start(self.setting.physics.control_dt())
     }
 
     /// Steps from here to the end of the motion or the time limit, whichever is nearer.
@@ -248,7 +278,8 @@ impl Imitate {
     }
 
     fn look_ahead(&mut self) {
-        self.reference.sample(
+        self.reference.sample_at(
+            &self.place,
             self.time + self.setting.physics.control_dt(),
             &mut self.next,
         );

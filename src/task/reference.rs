@@ -90,6 +90,14 @@ impl Reference {
         self.duration
     }
 
+    /// Latest start that leaves something to do in control steps of `control_dt` seconds.
+    pub fn last_start(&self, control_dt: f64) -> f64 {
+        match self.loop_mode {
+            LoopMode::Wrap => self.duration,
+            LoopMode::Clamp => (self.duration - 2.0 * control_dt).max(0.0),
+        }
+    }
+
     pub fn loop_mode(&self) -> LoopMode {
         self.loop_mode
     }
@@ -123,12 +131,17 @@ impl Reference {
     /// Writes the reference at `time` seconds into `sample`. A wrapping motion goes on cycle after cycle; an ending
     /// one holds its last frame.
     pub fn sample(&self, time: f64, sample: &mut Sample) {
+        self.sample_at(&Isometry3::identity(), time, sample);
+    }
+
+    /// The same, as if the motion had begun at `place`: a turn about the vertical and a shift along the ground.
+    pub fn sample_at(&self, place: &Isometry3<f32>, time: f64, sample: &mut Sample) {
         let (cycle, within) = self.split(time);
         let at = within * self.rate;
         let last = self.frames.len() - 1;
         let frame = (at.floor() as usize).min(last - 1);
         let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
-        let offset = self.cycle.offset(cycle).cast();
+        let offset = place * self.cycle.offset(cycle).cast::<f32>();
         for (link, (a, b)) in sample
             .links
             .iter_mut()
@@ -141,6 +154,22 @@ impl Reference {
         sample.contacts.copy_from_slice(&self.contacts[nearest]);
         sample.phase = (within / self.duration) as f32;
         sample.anchor = offset * self.start;
+    }
+
+    /// Seconds at which this motion is nearest to `sample` of another, whatever their places and headings: the sum over
+    /// all links of the squared distances, and of the squared differences of velocity times 0.1 s.
+    pub fn nearest(&self, sample: &Sample) -> f64 {
+        let wanted = upon_the_ground(&sample.links);
+        let distance = |links: &Vec<LinkState>| -> f32 {
+            let pairs = upon_the_ground(links).into_iter().zip(&wanted);
+            let apart = |(a, b): ([Vector3<f32>; 2], &[Vector3<f32>; 2])| {
+                (a[0] - b[0]).norm_squared() + 0.01 * (a[1] - b[1]).norm_squared()
+            };
+            pairs.map(apart).sum()
+        };
+        let distances = self.frames.iter().map(distance).enumerate();
+        let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.map_or(0.0, |(frame, _)| frame as f64 / self.rate)
     }
 
     fn split(&self, time: f64) -> (i64, f64) {
@@ -157,8 +186,18 @@ impl Reference {
     }
 }
 
+/// Place and velocity of each link, seen from the root's place on the ground and its heading.
+fn upon_the_ground(links: &[LinkState]) -> Vec<[Vector3<f32>; 2]> {
+    let into = anchor(&links[0].pose).inverse();
+    let seen = |link: &LinkState| {
+        let state = moved(link, &into);
+        [state.pose.translation.vector, state.linear]
+    };
+    links.iter().map(seen).collect()
+}
+
 /// The place on the ground below a pose, facing where its x axis does.
-fn anchor(pose: &Isometry3<f32>) -> Isometry3<f32> {
+pub(super) fn anchor(pose: &Isometry3<f32>) -> Isometry3<f32> {
     let at = pose.translation.vector;
     Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), heading(&pose.rotation))
 }

@@ -146,6 +146,8 @@ pub struct Setting {
     pub perturbations: Perturbations,
     /// Start at any phase (reference state initialisation), not only at the first frame.
     pub start_anywhere: bool,
+    /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it.
+    pub adaptive_starts: f64,
     /// Longest episode in training, seconds.
     pub episode_s: f64,
 }
@@ -160,6 +162,7 @@ impl Default for Setting {
             terminations: Terminations::default(),
             perturbations: Perturbations::default(),
             start_anywhere: true,
+            adaptive_starts: 0.5,
             episode_s: 10.0,
         }
     }
@@ -191,6 +194,7 @@ impl Setting {
             ),
             ("contact_s", physics.contact_s, 0.0..=1.0, "0 to 1"),
             ("episode_s", self.episode_s, positive.clone(), "positive"),
+            ("adaptive_starts", self.adaptive_starts, 0.0..=1.0, "0 to 1"),
             (
                 "the smallest reward weight",
                 f64::from(least),

@@ -2,9 +2,11 @@
 
 use super::setting::Terminations;
 use crate::sim::LinkState;
+use serde::{Deserialize, Serialize};
 
 /// Why an episode failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Failure {
     /// A link strayed too far from its reference.
     Distance,

@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::output;
 use crate::printer::Printer;
 use crate::runs::{self, Measured};
-use mimic::evaluate::Options;
+use mimic::evaluate::{Evaluation, Options};
 use mimic::learn::Run;
 use mimic::task::Perturbations;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,9 @@ Examples:
   mimic eval kick --json            the same fields as in runs/kick/eval.json
 
 A run's own eval.json is written with the default episodes and seconds alone, so that runs can be compared by it.";
+
+/// Phases that a table's line has room for.
+const MOST_PHASES: usize = 8;
 
 /// Every frame of every episode is held in memory until all are measured.
 const MOST_SECONDS: f64 = 3600.0;
@@ -123,6 +126,18 @@ fn keep(run: &Run, options: &Options, results: &[Measured], printer: &Printer) {
     }
 }
 
+/// Start phases from which it fails, the first few of them.
+fn failed(evaluation: &Evaluation) -> Option<(String, String)> {
+    let failures = &evaluation.failures;
+    let starts = failures.iter().take(MOST_PHASES);
+    let mut phases: Vec<String> = starts.map(|f| format!("{:.2}", f.start)).collect();
+    if failures.len() > MOST_PHASES {
+        phases.push("…".to_owned());
+    }
+    let name = "fails from phase".to_owned();
+    (!phases.is_empty()).then(|| (name, phases.join(" ")))
+}
+
 /// A table per motion.
 pub fn text(results: &[Measured]) -> String {
     let table = |measured: &Measured| {
@@ -175,7 +190,7 @@ pub fn text(results: &[Measured]) -> String {
                 ),
             ]
         });
-        let rows = rows.into_iter().chain(more);
+        let rows = rows.into_iter().chain(more).chain(failed(e));
         let rows: String = rows
             .map(|(name, value)| format!("  {name:34} {value:>12}\n"))
             .collect();

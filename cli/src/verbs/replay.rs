@@ -17,12 +17,15 @@ Examples:
   mimic replay --rerun                      the newest run, in the viewer
   mimic replay kick --rerun --beside        the run or clip `kick`, agent and reference side by side
   mimic replay walk.fbx --save walk.rrd     imports and retargets first; open it with `rerun walk.rrd`
+  mimic replay walk-and-run --rerun --sequence walk,run,walk   one policy, from one motion into the next
   mimic replay kick --connect 127.0.0.1:9876";
 
 /// Metres between agent and reference when they stand side by side.
 const BESIDE: f64 = 1.2;
 /// Seconds of a looping motion that are shown if nothing else is said.
 const SECONDS: f64 = 10.0;
+/// Seconds of each looping motion in a sequence.
+const SECONDS_IN_SEQUENCE: f64 = 4.0;
 
 /// Watch an agent with its reference, or a motion alone, in the rerun viewer
 #[derive(clap::Args)]
@@ -36,12 +39,21 @@ pub struct Args {
     /// Show a run's reference at the agent's side instead of over it
     #[arg(long)]
     beside: bool,
-    /// Seconds to show of a looping motion that a run's agent performs [default: 10]
+    /// Seconds to show of a looping motion that a run's agent performs [default: 10, in a sequence 4 each]
     #[arg(long, value_name = "S", value_parser = positive)]
     seconds: Option<f64>,
     /// Which motion to show, by number from 1, of a run that learned several [default: 1]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     motion: Option<usize>,
+    /// Show several motions of a run one after the other, by name or part of it, each for `--seconds` or to its end:
+    /// the agent goes over from one into the next
+    #[arg(
+        long,
+        value_name = "NAME,...",
+        value_delimiter = ',',
+        conflicts_with = "motion"
+    )]
+    sequence: Vec<String>,
     #[command(flatten)]
     import: ImportArgs,
     #[command(flatten)]
@@ -105,12 +117,13 @@ impl Args {
     fn record_run(&self, run: &Path) -> Outcome<Recording> {
         self.import.refuse_for(run, "a run")?;
         self.retarget.refuse_for(run, "a run")?;
+        let run = runs::open(Some(run))?;
+        if !self.sequence.is_empty() {
+            let seconds = self.seconds.unwrap_or(SECONDS_IN_SEQUENCE);
+            return runs::record_sequence(&run, &self.sequence, seconds);
+        }
         let which = self.motion.unwrap_or(1) - 1;
-        runs::record(
-            &runs::open(Some(run))?,
-            which,
-            self.seconds.unwrap_or(SECONDS),
-        )
+        runs::record(&run, which, self.seconds.unwrap_or(SECONDS))
     }
 
     fn record_motion(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
@@ -129,6 +142,7 @@ impl Args {
             ("--beside", self.beside),
             ("--seconds", self.seconds.is_some()),
             ("--motion", self.motion.is_some()),
+            ("--sequence", !self.sequence.is_empty()),
         ];
         let Some((flag, _)) = given.into_iter().find(|(_, given)| *given) else {
             return Ok(());

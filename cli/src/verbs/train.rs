@@ -13,7 +13,7 @@ use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
 use clap::ValueEnum;
-use mimic::learn::{Run, TrainError, Trainer};
+use mimic::learn::{Run, RunError, TrainError, Trainer};
 use mimic::task::{Perturbations, TaskError};
 use preset::Preset;
 use progress::Progress;
@@ -252,6 +252,15 @@ fn farewell(run: &Run) -> String {
     )
 }
 
+/// A run that can't be written any more, with a full disk for one: what was saved last is whole.
+fn unwritten(run: &Run, error: RunError) -> Failure {
+    runs::failure(error).with_remedy(format!(
+        "check its permissions and the room there, then go on with `{} train --resume {}`",
+        program(),
+        run.dir().display()
+    ))
+}
+
 /// Learns until the samples or the time are used up, or somebody wants to stop. Checkpoints stand between rounds,
 /// where a run resumes to the same bits.
 fn session(
@@ -272,7 +281,7 @@ fn session(
     let end = loop {
         let metrics = trainer.iterate().map_err(runs::learn_failure)?;
         let line = progress.line(&metrics);
-        run.log(&line).map_err(runs::failure)?;
+        run.log(&line).map_err(|e| unwritten(run, e))?;
         progress.show(&metrics, line, printer)?;
         if stop.is_wanted() {
             progress.say("ending this round");
@@ -280,7 +289,7 @@ fn session(
         if !trainer.is_done() && !trainer.is_between_rounds() {
             continue;
         }
-        finish::save(run, trainer)?;
+        finish::save(run, trainer).map_err(|e| unwritten(run, e))?;
         if stop.is_wanted() {
             break End::Interrupted;
         }

@@ -69,7 +69,12 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
             "{said}"
         );
     }
-    for flags in [&["--beside"][..], &["--seconds", "3"], &["--motion", "2"]] {
+    for flags in [
+        &["--beside"][..],
+        &["--seconds", "3"],
+        &["--motion", "2"],
+        &["--sequence", "sway"],
+    ] {
         let line = [&["replay", "sway.txt", "--save", "a.rrd"], flags].concat();
         let said = bench.complaint(&line, 2);
         assert!(
@@ -96,6 +101,38 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
     assert_ne!(read("beside.rrd").len(), 0);
     let said = bench.complaint(&["replay", "sway", "--save", "a.rrd", "--motion", "2"], 2);
     assert!(said.contains("no number 2"), "{said}");
+}
+
+#[test]
+fn motions_of_a_run_are_shown_one_after_the_other() {
+    let bench = Workbench::with_clip();
+    let clip = fs::read(bench.path("sway.txt")).expect("the clip is there");
+    bench.write("first.txt", &clip);
+    bench.write("second.txt", &clip);
+    bench.write(
+        "small.json",
+        br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 64, "hidden": [8] }"#,
+    );
+    let train = ["train", "first.txt", "second.txt", "--preset", "small.json"];
+    bench.mimic(&train).assert().success();
+    let line = [
+        "replay",
+        "--save",
+        "a.rrd",
+        "--seconds",
+        "0.2",
+        "--sequence",
+    ];
+    let shown = bench.json(&[&line[..], &["first,sec,first"]].concat());
+    assert_eq!(shown["agent"], true);
+    assert_eq!(shown["frames"], 18);
+    for (wrong, reason) in [("third", "no motion"), ("s", "several motions")] {
+        let said = bench.complaint(&[&line[..], &[wrong]].concat(), 2);
+        assert!(
+            said.contains(reason) && said.contains("first, second"),
+            "{said}"
+        );
+    }
 }
 
 /// A viewer that does nothing but end like this.

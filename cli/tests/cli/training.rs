@@ -260,6 +260,8 @@ fn a_run_that_cannot_be_written_is_failed_work() {
         std::fs::create_dir_all(bench.path("run").join(blocked)).expect("a folder can be made");
         let said = bench.complaint(&SMALL, 1);
         assert!(said.contains(blocked), "{said}");
+        let saving = blocked == "policy.safetensors";
+        assert_eq!(said.contains("train --resume run"), saving, "{said}");
         std::fs::remove_dir_all(bench.path("run")).expect("a folder can be removed");
     }
     std::fs::create_dir_all(bench.path("run/skeleton.xml")).expect("a folder can be made");

@@ -389,3 +389,49 @@ fn disturbances_are_those_of_their_seed() {
     let none = Perturbations::default();
     assert_eq!(play(none, Some(1)), play(none, None));
 }
+
+#[test]
+fn a_motion_is_nearest_to_itself_wherever_it_goes_on() {
+    let stage = stage();
+    let reference = Reference::new(&motion("walk.glb", Some(LoopMode::Wrap)), &stage);
+    let reference = reference.expect("a reference");
+    let mut sample = reference.blank();
+    let turned = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0);
+    let place = Isometry3::from_parts(Vector3::new(3.0, -1.0, 0.0).into(), turned);
+    for time in [0.1, 0.55, 0.9] {
+        reference.sample_at(&place, 3.0 * reference.duration() + time, &mut sample);
+        let nearest = reference.nearest(&sample);
+        assert!((nearest - time).abs() < 0.01, "{nearest}, not {time}");
+    }
+}
+
+/// From the walk into the kick: the kick begins where the walk has led, the character goes on as it is, and time counts
+/// from the start of the episode.
+#[test]
+fn another_motion_begins_where_the_one_before_has_led() {
+    let mut env = environment("walk.glb", Some(LoopMode::Wrap), 4.0);
+    env.reset(0.3);
+    let action = vec![0.0; env.action_size()];
+    for _ in 0..30 {
+        env.step(&action);
+    }
+    let mut before = env.blank();
+    env.wanted(&mut before);
+    let states = env.states().to_vec();
+    let kick = motion("kick.fbx", Some(LoopMode::Clamp));
+    let kick = Arc::new(Reference::new(&kick, &stage()).expect("a reference"));
+    env.change_to(&kick);
+    assert_eq!(env.states(), states);
+    let mut after = env.blank();
+    env.wanted(&mut after);
+    let root = |sample: &Sample| {
+        let pose = sample.links[0].pose;
+        (pose.translation.vector.xy(), pose.rotation * Vector3::x())
+    };
+    let ((at, ahead), (then, facing)) = (root(&before), root(&after));
+    assert!((at - then).norm() < 1e-4);
+    assert!(ahead.xy().normalize().dot(&facing.xy().normalize()) > 1.0 - 1e-5);
+    assert!((env.time() - kick.nearest(&before)).abs() < 1e-9);
+    let left = (kick.duration() - env.time()).min(3.0);
+    assert!((env.possible_steps() - (30.0 * left).ceil()).abs() <= 1.0);
+}

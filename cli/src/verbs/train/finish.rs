@@ -1,13 +1,13 @@
 //! What follows the learning: how well it went, and how to look at it.
 
-use super::program;
+use super::{program, unwritten};
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::runs;
 use crate::verbs::{eval, replay};
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
-use mimic::learn::{Run, Trainer};
+use mimic::learn::{Run, RunError, Trainer};
 use std::path::{Path, PathBuf};
 
 /// Seconds of a looping motion in the recording of a finished run.
@@ -23,11 +23,11 @@ fn evaluation(run: &Run) -> PathBuf {
 
 /// Saves what was learned. Results of an older policy don't stay beside a newer one, so whoever finds some knows
 /// that the run was finished.
-pub fn save(run: &Run, trainer: &Trainer) -> Outcome {
+pub fn save(run: &Run, trainer: &Trainer) -> Result<(), RunError> {
     for outdated in [evaluation(run), recording(run)] {
         std::fs::remove_file(outdated).ok();
     }
-    run.save(trainer).map_err(runs::failure)
+    run.save(trainer)
 }
 
 /// Measures and records what was learned.
@@ -60,7 +60,7 @@ pub fn make_up(run: &Run, trainer: &Trainer, printer: &Printer) -> Outcome {
         "`{folder}` has learned from all its samples, what is missing is its evaluation or recording"
     ));
     // The checkpoint is written first, so the policy may be that of the round before.
-    save(run, trainer)?;
+    save(run, trainer).map_err(|e| unwritten(run, e))?;
     finish(run, printer)
 }
 

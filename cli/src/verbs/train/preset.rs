@@ -104,7 +104,6 @@ fn is_setting(error: &RunError) -> bool {
         TrainError::Zero(_)
             | TrainError::FinalStd(_)
             | TrainError::FinalRate(_)
-            | TrainError::TooFewEnvironments { .. }
             | TrainError::Task(
                 TaskError::Setting { .. } | TaskError::NoSuchTerm { .. } | TaskError::Range { .. }
             )

@@ -1,0 +1,341 @@
+//! Where episodes begin: some anywhere, some where they fail within the next second.
+
+use super::random::uniform;
+use rand_chacha::ChaCha8Rng;
+
+/// A motion is cut into this many bins, or more so that none is longer than [`LONGEST_BIN`].
+const BINS: f64 = 10.0;
+/// Seconds.
+const LONGEST_BIN: f64 = 1.0;
+/// A start answers for failures within this many seconds.
+const AHEAD: f64 = 1.0;
+/// Samples after which what was seen counts half.
+const MEMORY: f64 = 1e5;
+/// Seconds of the average that each bin is thought to have been seen before, so that a bin that is hardly ever visited
+/// isn't judged by chance.
+const PRIOR: f64 = 10.0;
+
+/// What [`Starts`] needs to know of a motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// Seconds of a cycle.
+    pub duration: f64,
+    /// Latest start, seconds.
+    pub last_start: f64,
+    pub wraps: bool,
+}
+
+/// A moment of one of the motions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    pub motion: usize,
+    /// Seconds.
+    pub time: f64,
+}
+
+/// Part of a motion.
+#[derive(Clone, Debug)]
+struct Bin {
+    motion: usize,
+    /// Seconds, as are the rest.
+    from: f64,
+    length: f64,
+    /// Bins that a start here goes through within [`AHEAD`], with the time spent in each.
+    ahead: Vec<(usize, f64)>,
+}
+
+/// What happened in each bin.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tally {
+    pub steps: Vec<u32>,
+    pub failures: Vec<u32>,
+}
+
+impl Tally {
+    pub fn clear(&mut self, bins: usize) {
+        for counts in [&mut self.steps, &mut self.failures] {
+            counts.clear();
+            counts.resize(bins, 0);
+        }
+    }
+}
+
+/// Draws where episodes begin. A share of them begins where failure is likely, in proportion to the failures within a
+/// second of such a start; all others begin in any motion, and anywhere in it.
+#[derive(Clone, Debug)]
+pub(super) struct Starts {
+    bins: Vec<Bin>,
+    /// Of each motion, and the first bin of it.
+    motions: Vec<(Span, usize)>,
+    anywhere: bool,
+    share: f64,
+    control_dt: f64,
+    /// Fading sums over the samples.
+    steps: Vec<f32>,
+    failures: Vec<f32>,
+    /// Of each bin and those before it.
+    cumulative: Vec<f64>,
+}
+
+impl Starts {
+    /// Begins at the first frame of a motion unless `anywhere`; `share` of the starts follow the failures.
+    pub fn new(spans: &[Span], anywhere: bool, share: f64, control_dt: f64) -> Self {
+        let (mut bins, mut motions) = (Vec::new(), Vec::new());
+        for (motion, span) in spans.iter().enumerate() {
+            motions.push((*span, bins.len()));
+            bins.extend(cut(motion, span, bins.len(), anywhere));
+        }
+        let mut starts = Starts {
+            steps: vec![0.0; bins.len()],
+            failures: vec![0.0; bins.len()],
+            cumulative: Vec::new(),
+            bins,
+            motions,
+            anywhere,
+            share,
+            control_dt,
+        };
+        starts.weigh();
+        starts
+    }
+
+    pub fn bins(&self) -> usize {
+        self.bins.len()
+    }
+
+    /// The bin of a moment; later cycles count like the first.
+    pub fn bin(&self, place: Place) -> usize {
+        let (span, first) = self.motions[place.motion];
+        let end = self.motions.get(place.motion + 1);
+        let count = end.map_or(self.bins.len(), |(_, next)| *next) - first;
+        let within = if span.wraps {
+            place.time.rem_euclid(span.duration)
+        } else {
+            place.time
+        };
+        let at = (within / self.bins[first].length) as usize;
+        first + at.min(count - 1)
+    }
+
+    pub fn draw(&self, rng: &mut ChaCha8Rng) -> Place {
+        let total = self.cumulative[self.bins.len() - 1];
+        let at = uniform(rng) * total;
+        let index = self.cumulative.partition_point(|&sum| sum <= at);
+        let index = index.min(self.bins.len() - 1);
+        let Bin {
+            motion,
+            from,
+            length,
+            ..
+        } = self.bins[index];
+        let time = if self.anywhere {
+            (from + uniform(rng) * length).min(self.motions[motion].0.last_start)
+        } else {
+            0.0
+        };
+        Place { motion, time }
+    }
+
+    /// Takes in what happened in an iteration, from all groups.
+    pub fn learn<'a>(&mut self, tallies: impl Iterator<Item = &'a Tally>) {
+        let (mut steps, mut failures) = (vec![0_u32; self.bins()], vec![0_u32; self.bins()]);
+        for tally in tallies {
+            for (sums, counts) in [(&mut steps, &tally.steps), (&mut failures, &tally.failures)] {
+                sums.iter_mut().zip(counts).for_each(|(sum, c)| *sum += c);
+            }
+        }
+        let samples: u32 = steps.iter().sum();
+        let kept = (MEMORY / (MEMORY + f64::from(samples))) as f32;
+        for (sums, counts) in [(&mut self.steps, steps), (&mut self.failures, failures)] {
+            let fade = |(sum, count): (&mut f32, u32)| *sum = kept * *sum + count as f32;
+            sums.iter_mut().zip(counts).for_each(fade);
+        }
+        self.weigh();
+    }
+
+    /// Steps, then failures, of each bin.
+    pub fn state(&self) -> Vec<f32> {
+        [&self.steps[..], &self.failures].concat()
+    }
+
+    /// Goes on from a state of the same motions.
+    pub fn restore(&mut self, state: &[f32]) {
+        let (steps, failures) = state.split_at(self.bins());
+        self.steps.copy_from_slice(steps);
+        self.failures.copy_from_slice(failures);
+        self.weigh();
+    }
+
+    /// Failures per second of each bin.
+    fn hazards(&self) -> Vec<f64> {
+        let sum = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>();
+        let seconds = sum(&self.steps) * self.control_dt;
+        let mean = sum(&self.failures) / (seconds + PRIOR);
+        let hazard = |(steps, failures): (&f32, &f32)| {
+            let seconds = f64::from(*steps) * self.control_dt;
+            (f64::from(*failures) + PRIOR * mean) / (seconds + PRIOR)
+        };
+        self.steps.iter().zip(&self.failures).map(hazard).collect()
+    }
+
+    fn weigh(&mut self) {
+        let hazards = self.hazards();
+        let expected = |bin: &Bin| -> f64 {
+            let ahead = bin.ahead.iter();
+            ahead.map(|&(j, seconds)| hazards[j] * seconds).sum()
+        };
+        let likely: Vec<f64> = self.bins.iter().map(|b| b.length * expected(b)).collect();
+        let all: f64 = likely.iter().sum();
+        let share = if all > 0.0 { self.share } else { 0.0 };
+        let mut sum = 0.0;
+        self.cumulative.clear();
+        for (bin, likely) in self.bins.iter().zip(likely) {
+            let span = self.motions[bin.motion].0;
+            let even = bin.length / (reach(&span) * self.motions.len() as f64);
+            sum += (1.0 - share) * even + share * likely / all.max(f64::MIN_POSITIVE);
+            self.cumulative.push(sum);
+        }
+    }
+}
+
+/// Seconds of a motion in which episodes begin.
+fn reach(span: &Span) -> f64 {
+    span.last_start.max(f64::MIN_POSITIVE)
+}
+
+/// The bins of a motion, the first of which has number `first`.
+fn cut(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin> {
+    let count = match anywhere {
+        true => (reach(span) / LONGEST_BIN).ceil().max(BINS) as usize,
+        false => 1,
+    };
+    let length = reach(span) / count as f64;
+    let bin = |i: usize| Bin {
+        motion,
+        from: i as f64 * length,
+        length,
+        ahead: ahead(i, count, length, span.wraps)
+            .into_iter()
+            .map(|(j, seconds)| (first + j, seconds))
+            .collect(),
+    };
+    (0..count).map(bin).collect()
+}
+
+/// Bins passed within [`AHEAD`] from the middle of bin `i` on, and for how long each.
+fn ahead(i: usize, count: usize, length: f64, wraps: bool) -> Vec<(usize, f64)> {
+    let mut seconds = vec![0.0; count];
+    let (mut left, mut here) = (AHEAD, length / 2.0);
+    for j in i.. {
+        if left <= 0.0 || (j >= count && !wraps) {
+            break;
+        }
+        let spent = here.min(left);
+        seconds[j % count] += spent;
+        left -= spent;
+        here = length;
+    }
+    let passed = seconds.into_iter().enumerate();
+    passed.filter(|(_, seconds)| *seconds > 0.0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::random::stream;
+
+    const DT: f64 = 1.0 / 30.0;
+
+    fn span(duration: f64, wraps: bool) -> Span {
+        Span {
+            duration,
+            last_start: duration,
+            wraps,
+        }
+    }
+
+    fn draws(starts: &Starts, count: usize) -> Vec<Place> {
+        let mut rng = stream(3, 0, 0);
+        (0..count).map(|_| starts.draw(&mut rng)).collect()
+    }
+
+    fn share(places: &[Place], inside: impl Fn(&Place) -> bool) -> f64 {
+        places.iter().filter(|p| inside(p)).count() as f64 / places.len() as f64
+    }
+
+    /// All bins seen for a minute, and `failures` in the bin of `place`.
+    fn failing(starts: &mut Starts, place: Place, failures: u32) {
+        let mut tally = Tally::default();
+        tally.clear(starts.bins());
+        tally.steps.fill(1800);
+        tally.failures[starts.bin(place)] = failures;
+        starts.learn(std::iter::once(&tally));
+    }
+
+    #[test]
+    fn without_failures_starts_are_even() {
+        let starts = Starts::new(&[span(2.0, true), span(6.0, false)], true, 0.5, DT);
+        let places = draws(&starts, 20_000);
+        assert!((share(&places, |p| p.motion == 0) - 0.5).abs() < 0.02);
+        let early = |p: &Place| p.motion == 1 && p.time < 1.5;
+        assert!((share(&places, early) - 0.125).abs() < 0.01);
+        assert!(places.iter().all(|p| p.time <= 6.0));
+    }
+
+    #[test]
+    fn half_of_the_starts_lead_to_the_failures() {
+        let mut starts = Starts::new(&[span(10.0, false)], true, 0.5, DT);
+        let place = Place {
+            motion: 0,
+            time: 6.5,
+        };
+        failing(&mut starts, place, 1000);
+        let places = draws(&starts, 20_000);
+        // The bin from 6 to 7 s and the one before it are a fifth of the motion, and lead to all but the prior's failures.
+        let near = share(&places, |p| (5.0..7.0).contains(&p.time));
+        assert!(near > 0.1 + 0.5 * 0.8, "{near}");
+        let far = share(&places, |p| p.time < 5.0 || p.time >= 7.0);
+        assert!(far > 0.5 * 0.8, "{far}");
+    }
+
+    #[test]
+    fn what_leads_over_the_seam_counts() {
+        let mut starts = Starts::new(&[span(20.0, true)], true, 1.0, DT);
+        let place = Place {
+            motion: 0,
+            time: 40.3,
+        };
+        assert_eq!(starts.bin(place), 0);
+        failing(&mut starts, place, 1000);
+        let places = draws(&starts, 10_000);
+        assert!(share(&places, |p| p.time >= 19.0) > 0.2);
+    }
+
+    #[test]
+    fn the_motion_that_fails_is_drawn_oftener() {
+        let spans = [span(1.0, true), span(1.0, true)];
+        let mut starts = Starts::new(&spans, false, 0.5, DT);
+        let place = Place {
+            motion: 1,
+            time: 0.4,
+        };
+        failing(&mut starts, place, 1000);
+        let places = draws(&starts, 10_000);
+        assert!(share(&places, |p| p.motion == 1) > 0.65);
+        assert!(places.iter().all(|p| p.time == 0.0));
+    }
+
+    #[test]
+    fn a_state_comes_back() {
+        let mut starts = Starts::new(&[span(3.0, true)], true, 0.5, DT);
+        let fresh = starts.clone();
+        let place = Place {
+            motion: 0,
+            time: 1.0,
+        };
+        failing(&mut starts, place, 5);
+        let mut back = fresh;
+        back.restore(&starts.state());
+        assert_eq!(draws(&back, 100), draws(&starts, 100));
+    }
+}
