@@ -5,23 +5,37 @@ use mimic::learn::{Config, Plan, Run, Trainer};
 use mimic::motion::Motion;
 use mimic::retarget;
 use mimic::skeleton::Skeleton;
-use mimic::task::Stage;
+use mimic::task::{Setting, Stage};
 use std::path::Path;
 
 fn skeleton() -> Skeleton {
     Skeleton::load("humanoid").expect("the built-in humanoid loads")
 }
 
-fn kick() -> Motion {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("clips/kick.fbx");
-    let clip = import::load(file, &import::Options::default()).expect("our own kick reads");
+fn motion(clip: &str) -> Motion {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("clips")
+        .join(clip);
+    let clip = import::load(file, &import::Options::default()).expect("our own clip reads");
     retarget::retarget(&clip, &skeleton(), &Default::default())
-        .expect("our own kick retargets")
+        .expect("our own clip retargets")
         .motion
+}
+
+fn kick() -> Motion {
+    motion("kick.fbx")
+}
+
+fn both() -> Vec<Motion> {
+    vec![kick(), motion("walk.glb")]
 }
 
 fn tiny() -> Plan {
     Plan {
+        task: Setting {
+            adaptive_starts: 0.5,
+            ..Setting::default()
+        },
         ppo: Config {
             minibatch: 64,
             ..Plan::default().ppo
@@ -61,7 +75,7 @@ fn on_threads(threads: usize, work: impl FnOnce() -> Vec<u32> + Send) -> Vec<u32
 fn the_same_seed_gives_the_same_bits_at_any_number_of_threads() {
     let train = |seed| {
         let plan = Plan { seed, ..tiny() };
-        let mut trainer = Trainer::new(plan, Stage::new(skeleton()).expect("a stage"), &[kick()])
+        let mut trainer = Trainer::new(plan, Stage::new(skeleton()).expect("a stage"), &both())
             .expect("a trainer");
         learned(&mut trainer, 4)
     };
@@ -82,20 +96,18 @@ fn the_same_seed_gives_the_same_bits_at_any_number_of_threads() {
 #[test]
 fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let whole = Run::create(
-        &folder.path().join("whole"),
-        tiny(),
-        skeleton(),
-        vec![kick()],
-    )
-    .expect("a run");
+    let whole =
+        Run::create(&folder.path().join("whole"), tiny(), skeleton(), both()).expect("a run");
     let unbroken = learned(&mut whole.trainer().expect("a trainer"), 6);
 
     let path = folder.path().join("broken");
-    let run = Run::create(&path, tiny(), skeleton(), vec![kick()]).expect("a run");
+    let run = Run::create(&path, tiny(), skeleton(), both()).expect("a run");
     let mut trainer = run.trainer().expect("a trainer");
     learned(&mut trainer, 4);
     assert!(trainer.is_between_rounds());
+    let starts = trainer.state().starts;
+    let failures = &starts[starts.len() / 2..];
+    assert!(failures.iter().sum::<f32>() > 0.0, "nothing to carry over");
     run.save(&trainer).expect("the checkpoint is saved");
     learned(&mut trainer, 1);
     drop((run, trainer));

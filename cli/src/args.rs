@@ -4,6 +4,7 @@ use crate::failure::{Failure, Outcome};
 use crate::verbs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mimic::clip::LoopMode;
+use mimic::humanoid::Slot;
 use mimic::import::{Options, UpAxis};
 use mimic::skeleton::Skeleton;
 use std::path::{Path, PathBuf};
@@ -151,17 +152,23 @@ pub struct RetargetArgs {
     /// Joint map, as `mimic info --write-map` writes it [default: found out]
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,
+    /// How much a slot of the joint map counts, as a multiple of what it counts by default, e.g. `head=3`; can be given
+    /// several times
+    #[arg(long, value_name = "SLOT=X", value_parser = slot_weight)]
+    pub weight: Vec<(Slot, f64)>,
 }
 
 impl RetargetArgs {
     /// As for import options: nothing is ignored.
     pub fn refuse_for(&self, file: &Path, kind: &str) -> Outcome {
-        if self.skeleton.is_none() && self.map.is_none() {
+        if self.skeleton.is_none() && self.map.is_none() && self.weight.is_empty() {
             return Ok(());
         }
         Err(Failure::input(
             file,
-            format!("is {kind} already, `--skeleton` and `--map` don't apply; give the clip"),
+            format!(
+                "is {kind} already, `--skeleton`, `--map` and `--weight` don't apply; give the clip"
+            ),
         ))
     }
 
@@ -178,6 +185,18 @@ pub fn positive(text: &str) -> Result<f64, String> {
     } else {
         Err("not a positive number".into())
     }
+}
+
+/// A slot of the joint map with a number, as `head=3`.
+fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
+    let known = || Slot::ALL.map(Slot::name).join(", ");
+    let (name, weight) = text
+        .split_once('=')
+        .ok_or("give a slot and how much it counts, e.g. head=3")?;
+    let slot = Slot::ALL.into_iter().find(|slot| slot.name() == name);
+    let slot = slot.ok_or_else(|| format!("there is no slot `{name}`, only {}", known()))?;
+    let weight = weight.parse().map_err(|_| "the weight is no number")?;
+    Ok((slot, weight))
 }
 
 pub fn at_least_one(text: &str) -> Result<usize, String> {

@@ -63,7 +63,8 @@ impl Preparation {
             self.file.display(),
             skeleton.name
         ));
-        let options = retarget::Options { map };
+        let weights = self.retarget.weight.iter().copied().collect();
+        let options = retarget::Options { map, weights };
         let done = retarget::retarget(&clip, &skeleton, &options)
             .map_err(|e| Failure::input(&self.file, e))?;
         let new = |problem: &&Problem| !clip.problems.contains(problem);
@@ -80,10 +81,14 @@ impl Preparation {
 
     fn load(&self, printer: &Printer) -> Outcome<Prepared> {
         self.import.refuse_for(&self.file, "a motion")?;
-        if self.retarget.map.is_some() {
+        let flags = [
+            ("--map", self.retarget.map.is_some()),
+            ("--weight", !self.retarget.weight.is_empty()),
+        ];
+        if let Some((flag, _)) = flags.into_iter().find(|(_, given)| *given) {
             return Err(Failure::input(
                 &self.file,
-                "is retargeted already, `--map` doesn't apply; give the clip",
+                format!("is retargeted already, `{flag}` doesn't apply; give the clip"),
             ));
         }
         let motion = Motion::load(&self.file).map_err(|e| Failure::motion(&self.file, e))?;

@@ -128,19 +128,21 @@ pub fn record_sequence(run: &Run, names: &[String], seconds: f64) -> Outcome<Rec
     shown(run, &names.join("-"), which[0], &performer, &trace)
 }
 
-/// The motion of a run that a name means: its whole name, or a part that no other has.
+/// The motion of a run that a name means: its whole name, or a part of it, that no other has.
 fn number_of(run: &Run, name: &str) -> Outcome<usize> {
     let motions = run.motions();
-    if let Some(exact) = motions.iter().position(|m| m.name == name) {
-        return Ok(exact);
-    }
-    let mut with = (0..motions.len()).filter(|&i| motions[i].name.contains(name));
+    let exact = motions.iter().any(|m| m.name == name);
+    let means = |i: &usize| match exact {
+        true => motions[*i].name == name,
+        false => !name.is_empty() && motions[*i].name.contains(name),
+    };
+    let mut with = (0..motions.len()).filter(means);
     match (with.next(), with.next()) {
         (Some(only), None) => Ok(only),
         (found, _) => {
             let known: Vec<&str> = motions.iter().map(|m| m.name.as_str()).collect();
             let what = match found {
-                Some(_) => "several motions whose names have",
+                Some(_) => "several motions for",
                 None => "no motion",
             };
             Err(Failure::user(format!(

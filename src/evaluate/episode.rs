@@ -42,7 +42,7 @@ pub struct Trace {
     pub start: Start,
     pub control_hz: f64,
     pub frames: Vec<Frame>,
-    /// Steps of an episode without failure.
+    /// Steps of an episode without failure; in a sequence those of the motions that were begun.
     pub possible: usize,
     /// Frames before a failure; with one, the last frame shows it.
     pub survived: usize,
@@ -106,6 +106,7 @@ pub fn play_sequence(
         if part > 0 {
             env.change_to(reference);
         }
+        trace.largest_momentum = trace.largest_momentum.max(reference.largest_momentum());
         let steps = episode_s(reference, seconds) * setting.physics.control_hz;
         let steps = steps.round().clamp(1.0, env.possible_steps()) as usize;
         trace.possible += steps;

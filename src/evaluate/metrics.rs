@@ -55,7 +55,7 @@ pub struct Evaluation {
 /// An episode that failed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Failed {
-    /// Where in the motion it started, as a share of it.
+    /// Where in the motion it started, as a share of all possible starts.
     pub start: f64,
     pub survived_s: f64,
     pub failure: Failure,

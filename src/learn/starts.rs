@@ -9,7 +9,7 @@ const BINS: f64 = 10.0;
 const LONGEST_BIN: f64 = 1.0;
 /// A start answers for failures within this many seconds.
 const AHEAD: f64 = 1.0;
-/// Samples after which what was seen counts half.
+/// Time constant in which what was seen fades, samples.
 const MEMORY: f64 = 1e5;
 /// Seconds of the average that each bin is thought to have been seen before, so that a bin that is hardly ever visited
 /// isn't judged by chance.
@@ -61,7 +61,7 @@ impl Tally {
 }
 
 /// Draws where episodes begin. A share of them begins where failure is likely, in proportion to the failures within a
-/// second of such a start; all others begin in any motion, and anywhere in it.
+/// second of such a start; all others begin in any motion, and anywhere in it. A long motion counts like a short one.
 #[derive(Clone, Debug)]
 pub(super) struct Starts {
     bins: Vec<Bin>,
@@ -184,15 +184,17 @@ impl Starts {
             let ahead = bin.ahead.iter();
             ahead.map(|&(j, seconds)| hazards[j] * seconds).sum()
         };
-        let likely: Vec<f64> = self.bins.iter().map(|b| b.length * expected(b)).collect();
+        let even = |bin: &Bin| {
+            let reach = reach(&self.motions[bin.motion].0);
+            bin.length / (reach * self.motions.len() as f64)
+        };
+        let likely: Vec<f64> = self.bins.iter().map(|b| even(b) * expected(b)).collect();
         let all: f64 = likely.iter().sum();
         let share = if all > 0.0 { self.share } else { 0.0 };
         let mut sum = 0.0;
         self.cumulative.clear();
         for (bin, likely) in self.bins.iter().zip(likely) {
-            let span = self.motions[bin.motion].0;
-            let even = bin.length / (reach(&span) * self.motions.len() as f64);
-            sum += (1.0 - share) * even + share * likely / all.max(f64::MIN_POSITIVE);
+            sum += (1.0 - share) * even(bin) + share * likely / all.max(f64::MIN_POSITIVE);
             self.cumulative.push(sum);
         }
     }
@@ -214,7 +216,7 @@ fn cut(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin> {
         motion,
         from: i as f64 * length,
         length,
-        ahead: ahead(i, count, length, span.wraps)
+        ahead: ahead(i, count, length, anywhere, span.wraps)
             .into_iter()
             .map(|(j, seconds)| (first + j, seconds))
             .collect(),
@@ -222,10 +224,10 @@ fn cut(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin> {
     (0..count).map(bin).collect()
 }
 
-/// Bins passed within [`AHEAD`] from the middle of bin `i` on, and for how long each.
-fn ahead(i: usize, count: usize, length: f64, wraps: bool) -> Vec<(usize, f64)> {
+/// Bins passed within [`AHEAD`] from the middle of bin `i` on, or else from its start, and for how long each.
+fn ahead(i: usize, count: usize, length: f64, middle: bool, wraps: bool) -> Vec<(usize, f64)> {
     let mut seconds = vec![0.0; count];
-    let (mut left, mut here) = (AHEAD, length / 2.0);
+    let (mut left, mut here) = (AHEAD, if middle { length / 2.0 } else { length });
     for j in i.. {
         if left <= 0.0 || (j >= count && !wraps) {
             break;
@@ -313,16 +315,18 @@ mod tests {
 
     #[test]
     fn the_motion_that_fails_is_drawn_oftener() {
-        let spans = [span(1.0, true), span(1.0, true)];
-        let mut starts = Starts::new(&spans, false, 0.5, DT);
+        let spans = [span(30.0, true), span(1.0, false)];
         let place = Place {
             motion: 1,
             time: 0.4,
         };
-        failing(&mut starts, place, 1000);
-        let places = draws(&starts, 10_000);
-        assert!(share(&places, |p| p.motion == 1) > 0.65);
-        assert!(places.iter().all(|p| p.time == 0.0));
+        for anywhere in [false, true] {
+            let mut starts = Starts::new(&spans, anywhere, 0.5, DT);
+            failing(&mut starts, place, 1000);
+            let places = draws(&starts, 10_000);
+            assert!(share(&places, |p| p.motion == 1) > 0.65);
+            assert!(anywhere || places.iter().all(|p| p.time == 0.0));
+        }
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub struct Plan {
     pub group: usize,
     /// Control steps of each environment in an iteration.
     pub horizon: usize,
-    /// Iterations after which all episodes begin anew. Between rounds nothing but the learner has a state, so that is
+    /// Iterations after which all episodes begin anew. Between rounds no episode is under way, so that is
     /// where a run can be stopped and resumed to the same bits.
     pub round: u64,
     /// Samples after which training ends.
@@ -259,9 +259,14 @@ impl Trainer {
     /// # Errors
     /// A state of another network.
     pub fn restore(&mut self, state: TrainerState) -> Result<(), LearnError> {
-        super::check_length("saved starts", state.starts.len(), 2 * self.starts.bins())?;
+        // Runs from before starts were counted have none.
+        if !state.starts.is_empty() {
+            super::check_length("saved starts", state.starts.len(), 2 * self.starts.bins())?;
+        }
         self.learner.restore(state.learner)?;
-        self.starts.restore(&state.starts);
+        if !state.starts.is_empty() {
+            self.starts.restore(&state.starts);
+        }
         self.normalizer = state.normalizer;
         self.iteration = state.iteration;
         self.stale = true;

@@ -209,7 +209,7 @@ fn poses(
     let pose = |(p, r): (&[f64], &[f64])| {
         let shift = Translation3::from(Vector3::from_column_slice(p));
         let turn = stored_rotation(Quaternion::new(r[0], r[1], r[2], r[3]));
-        let turn = turn.ok_or("the rotation of a body is zero")?;
+        let turn = turn.ok_or("the rotation of a body is zero: `body_rotation` is damaged")?;
         Ok(Isometry3::from_parts(shift, turn))
     };
     positions

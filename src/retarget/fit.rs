@@ -6,7 +6,7 @@ use super::goals::Goals;
 use super::model::Model;
 use super::rotation;
 use super::solve::{self, Solver};
-use super::spin::{self, Turn};
+use super::spin::{self, Tilt};
 use super::stance::Anchor;
 use crate::motion::Cycle;
 use crate::skeleton::limits;
@@ -43,26 +43,31 @@ impl<'a> Fit<'a> {
         }
         let iterations = self.solver(&self.problem(goals)).run(&mut frames);
         let (flights, lifts) = self.air(&frames).lifts();
-        let mut turns = Vec::new();
+        let mut tilts = Vec::new();
         if !flights.is_empty() {
             self.lift(goals, &lifts, &mut frames);
-            turns = spin::turns(&self.air(&frames), &flights);
-            self.turn(goals, &turns, &mut frames);
-            self.set_free(&flights, &mut frames);
+            tilts = spin::tilts(&self.air(&frames), &flights);
+            self.tilt(goals, &tilts, &mut frames);
         }
-        self.mend(&self.problem(goals), &mut frames);
+        let problem = self.problem(goals);
+        self.mend(&problem, &mut frames);
+        if !flights.is_empty() {
+            self.set_free(&flights, &mut frames);
+            // A flight that was freed may touch what it flew past.
+            self.mend(&problem, &mut frames);
+        }
         if let (Some(cycle), Some(first)) = (self.cycle, frames.first()) {
             let turn = rotation::exp(&(Vector3::z() * cycle.heading)).to_rotation_matrix();
             let last = solve::carried(first, turn.matrix(), &cycle.translation);
             frames.push(last);
         }
         let flying = lifts.iter().flatten().filter(|lift| lift.flies);
-        let turns = turns.iter().flatten().map(|turn: &Turn| turn.by.angle());
+        let tilts = tilts.iter().flatten().map(|tilt: &Tilt| tilt.by.angle());
         Fitted {
             frames,
             iterations,
             lifted: flying.map(|lift| lift.shift.norm()).fold(0.0, f64::max),
-            turned: turns.fold(0.0, f64::max),
+            turned: tilts.fold(0.0, f64::max),
         }
     }
 
@@ -106,14 +111,14 @@ impl<'a> Fit<'a> {
     }
 
     /// Turns flights so that they spin freely, with what leads to them.
-    fn turn(&self, goals: &mut Goals, turns: &[Option<Turn>], frames: &mut [Vec<f64>]) {
-        for (f, turn) in turns.iter().enumerate() {
-            let Some(turn) = turn else { continue };
-            spin::turn_goals(self.model, goals, f, &self.anchors[f], (&frames[f], turn));
-            turn.apply(self.model.skeleton, &mut frames[f]);
+    fn tilt(&self, goals: &mut Goals, tilts: &[Option<Tilt>], frames: &mut [Vec<f64>]) {
+        for (f, tilt) in tilts.iter().enumerate() {
+            let Some(tilt) = tilt else { continue };
+            spin::tilt_goals(self.model, goals, f, &self.anchors[f], (&frames[f], tilt));
+            tilt.apply(self.model.skeleton, &mut frames[f]);
         }
         // What flies was turned with its goals, and fits them as before.
-        let leads = |f: usize, _: &[f64]| turns[f].is_some_and(|turn| !turn.flies);
+        let leads = |f: usize, _: &[f64]| tilts[f].is_some_and(|tilt| !tilt.flies);
         let problem = self.problem(goals);
         self.solver(&problem).mend(frames, leads);
     }
@@ -126,10 +131,10 @@ impl<'a> Fit<'a> {
                 lift.apply(qpos);
             }
         }
-        let turns = spin::turns(&self.air(frames), flights);
-        for (qpos, turn) in frames.iter_mut().zip(turns) {
-            if let Some(turn) = turn.filter(|turn| turn.flies) {
-                turn.apply(self.model.skeleton, qpos);
+        let tilts = spin::tilts(&self.air(frames), flights);
+        for (qpos, tilt) in frames.iter_mut().zip(tilts) {
+            if let Some(tilt) = tilt.filter(|tilt| tilt.flies) {
+                tilt.apply(self.model.skeleton, qpos);
             }
         }
     }

@@ -6,6 +6,7 @@ use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::skeleton::{Skeleton, limits};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A point that follows the source: the origin of a body.
@@ -19,6 +20,7 @@ pub(super) struct Key {
 /// A body whose orientation follows the source.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turn {
+    pub slot: Slot,
     pub body: usize,
     /// Metres per radian.
     pub weight: f64,
@@ -38,8 +40,14 @@ pub(super) struct Goals {
     pub hanging: Vec<[Vector3<f64>; 2]>,
 }
 
-/// Weight of a slot's point, and of its orientation in metres per radian.
-fn weights(slot: Slot) -> (f64, f64) {
+/// Weight of a slot's point, and of its orientation in metres per radian; `by` has multiples of some.
+fn weights(slot: Slot, by: &BTreeMap<Slot, f64>) -> (f64, f64) {
+    let (point, turn) = usual_weights(slot);
+    let times = by.get(&slot).copied().unwrap_or(1.0);
+    (point * times, turn * times)
+}
+
+fn usual_weights(slot: Slot) -> (f64, f64) {
     match slot {
         Slot::Hips => (1.0, 0.3),
         Slot::Chest => (0.0, 0.3),
@@ -67,17 +75,23 @@ pub(super) const LEGS: [[Slot; 3]; 2] = [
 ];
 
 impl Goals {
-    pub fn new(clip: &Clip, map: &HumanoidMap, alignment: &Alignment, model: &Model) -> Goals {
+    pub fn new(
+        clip: &Clip,
+        map: &HumanoidMap,
+        alignment: &Alignment,
+        model: &Model,
+        by: &BTreeMap<Slot, f64>,
+    ) -> Goals {
         let skeleton = model.skeleton;
         let slot_body = |slot: Slot| skeleton.slots.get(&slot).copied();
         let keys: Vec<Key> = Slot::ALL
             .into_iter()
-            .filter(|slot| weights(*slot).0 > 0.0 && map.joint(*slot).is_some())
+            .filter(|slot| weights(*slot, by).0 > 0.0 && map.joint(*slot).is_some())
             .filter_map(|slot| {
                 Some(Key {
                     slot,
                     body: slot_body(slot)?,
-                    weight: weights(slot).0,
+                    weight: weights(slot, by).0,
                 })
             })
             .collect();
@@ -87,8 +101,9 @@ impl Goals {
                 (
                     i,
                     Turn {
+                        slot: bind.slot,
                         body: bind.body,
-                        weight: weights(bind.slot).1,
+                        weight: weights(bind.slot, by).1,
                     },
                 )
             })

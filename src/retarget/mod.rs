@@ -39,14 +39,21 @@ use model::Model;
 use nalgebra::Vector3;
 use source::Source;
 use stance::{Anchor, Contacts};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Instant;
+
+/// Most times that a slot can count: beyond, the solution is hardly determined by anything else.
+const MOST_WEIGHT: f64 = 100.0;
 
 /// How to retarget.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// Which joint stands for which slot; found by [`humanoid::map`] if left out.
     pub map: Option<HumanoidMap>,
+    /// How much a slot's place and turn count, as a multiple of what they count by default: 0 to 100. Slots that are left
+    /// out count once. What stands stands still whatever it counts.
+    pub weights: BTreeMap<Slot, f64>,
 }
 
 /// Why a clip can't be carried onto a skeleton.
@@ -62,6 +69,8 @@ pub enum RetargetError {
         joint: usize,
         count: usize,
     },
+    #[error("slot `{slot}` has the weight {weight}; give it 0 to {MOST_WEIGHT}")]
+    Weight { slot: Slot, weight: f64 },
     #[error("clip `{clip}` has no frames")]
     Empty { clip: String },
     #[error("clip `{clip}` has a value that is no finite number at frame {frame}, joint `{joint}`")]
@@ -114,12 +123,13 @@ pub fn retarget(
 ) -> Result<Retargeted, RetargetError> {
     let start = Instant::now();
     check(clip, skeleton)?;
+    check_weights(&options.weights)?;
     let map = joint_map(clip, options)?;
     let (clip, own) = clip.with_margins();
     let clip = clip.as_ref();
     let alignment = align::align(clip, &map, skeleton)?;
     let model = Model::new(skeleton);
-    let mut goals = Goals::new(clip, &map, &alignment, &model);
+    let mut goals = Goals::new(clip, &map, &alignment, &model, &options.weights);
     let leg = skeleton.leg_length();
     let mut source = Source::new(clip, &map, &alignment, skeleton);
     let mut problems = clip.problems.clone();
@@ -165,6 +175,16 @@ pub fn retarget(
         seconds: start.elapsed().as_secs_f64(),
         iterations,
     })
+}
+
+fn check_weights(weights: &BTreeMap<Slot, f64>) -> Result<(), RetargetError> {
+    let wrong = weights
+        .iter()
+        .find(|(_, weight)| !(0.0..=MOST_WEIGHT).contains(*weight));
+    match wrong {
+        Some((&slot, &weight)) => Err(RetargetError::Weight { slot, weight }),
+        None => Ok(()),
+    }
 }
 
 /// Leaves the frames `own`.

@@ -29,12 +29,12 @@ struct Step {
 /// How a body is turned about its centre of mass, and whether it flies there; elsewhere it keeps its feet and hands on the
 /// ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Turn {
+pub(super) struct Tilt {
     pub by: UnitQuaternion<f64>,
     pub flies: bool,
 }
 
-impl Turn {
+impl Tilt {
     pub fn apply(&self, skeleton: &Skeleton, qpos: &mut [f64]) {
         turn(skeleton, qpos, &self.by);
     }
@@ -42,36 +42,36 @@ impl Turn {
 
 /// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `None` where it
 /// stays.
-pub(super) fn turns(air: &Air, flights: &[Flight]) -> Vec<Option<Turn>> {
-    let mut turns = vec![None; air.frames.len()];
+pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Vec<Option<Tilt>> {
+    let mut tilts = vec![None; air.frames.len()];
     for flight in flights {
         let (a, b) = flight.span;
         let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
         let Some(found) = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps)) else {
             continue;
         };
-        for (index, turn) in with_ends(air, flight, &found) {
+        for (index, tilt) in with_ends(air, flight, &found) {
             if let Some((n, f)) = air.locate(index) {
                 let heading = air.offset(n).rotation;
-                let by = heading.inverse() * turn.by * heading;
-                turns[f] = Some(Turn { by, ..turn });
+                let by = heading.inverse() * tilt.by * heading;
+                tilts[f] = Some(Tilt { by, ..tilt });
             }
         }
     }
-    turns
+    tilts
 }
 
 /// A flight's turns, and before and after it those that lead to and from their speed.
-fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(i64, Turn)> {
+fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(i64, Tilt)> {
     let last = turns.len() - 1;
-    let turn = |by, flies| Turn { by, flies };
+    let tilt = |by, flies| Tilt { by, flies };
     let ends = air.ends(flight).into_iter().map(|(index, end, share)| {
         let next = [turns[1], turns[last - 1]][end].scaled_axis();
         let by = UnitQuaternion::from_scaled_axis(next * share);
-        (index, turn(by, false))
+        (index, tilt(by, false))
     });
     let flying = turns.iter().enumerate().take(last).skip(1);
-    let flying = flying.map(|(i, by)| (flight.span.0 + i as i64, turn(*by, true)));
+    let flying = flying.map(|(i, by)| (flight.span.0 + i as i64, tilt(*by, true)));
     ends.chain(flying).collect()
 }
 
@@ -131,18 +131,22 @@ fn turn(skeleton: &Skeleton, qpos: &mut [f64], by: &UnitQuaternion<f64>) {
     put_quaternion(qpos, 3, &(by * quaternion(qpos, 3)));
 }
 
-/// Turns the goals of a frame about the centre of mass of its pose.
-pub(super) fn turn_goals(
+/// Turns the goals of a frame about the centre of mass of its pose; what stands keeps its own.
+pub(super) fn tilt_goals(
     model: &Model,
     goals: &mut Goals,
     f: usize,
     anchors: &[Anchor],
-    (qpos, turn): (&[f64], &Turn),
+    (qpos, tilt): (&[f64], &Tilt),
 ) {
     let com = model.skeleton.com(&model.skeleton.forward(qpos));
     for (key, point) in goals.keys.iter().zip(&mut goals.points[f]) {
-        let moved = com + turn.by * (*point - com);
-        *point = point.lerp(&moved, share(model, key.slot, anchors, turn.flies));
+        let moved = com + tilt.by * (*point - com);
+        *point = point.lerp(&moved, share(model, key.slot, anchors, tilt.flies));
+    }
+    for (goal, rotation) in goals.turns.iter().zip(&mut goals.rotations[f]) {
+        let share = share(model, goal.slot, anchors, tilt.flies);
+        *rotation = tilt.by.powf(share) * *rotation;
     }
 }
 
@@ -203,10 +207,10 @@ mod tests {
         let (flights, _) = air.lifts();
         let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
         assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-        let found = turns(&air, &flights);
+        let found = tilts(&air, &flights);
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
-            let Some(Turn { by, .. }) = turned else {
+            let Some(Tilt { by, .. }) = turned else {
                 continue;
             };
             turn(&skeleton, qpos, by);

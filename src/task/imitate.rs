@@ -39,7 +39,7 @@ pub struct Step {
 pub struct Imitate {
     stage: Arc<Stage>,
     reference: Arc<Reference>,
-    /// Where the reference begins.
+    /// Carries the whole reference to where it is performed.
     place: Isometry3<f32>,
     setting: Setting,
     world: World,

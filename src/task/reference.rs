@@ -134,7 +134,7 @@ impl Reference {
         self.sample_at(&Isometry3::identity(), time, sample);
     }
 
-    /// The same, as if the motion had begun at `place`: a turn about the vertical and a shift along the ground.
+    /// The same, with the whole motion moved by `place`: a turn about the vertical and a shift along the ground.
     pub fn sample_at(&self, place: &Isometry3<f32>, time: f64, sample: &mut Sample) {
         let (cycle, within) = self.split(time);
         let at = within * self.rate;
@@ -157,7 +157,8 @@ impl Reference {
     }
 
     /// Seconds at which this motion is nearest to `sample` of another, whatever their places and headings: the sum over
-    /// all links of the squared distances, and of the squared differences of velocity times 0.1 s.
+    /// all links of the squared distances, and of the squared differences of velocity times 0.1 s. One that ends is
+    /// entered in its first half.
     pub fn nearest(&self, sample: &Sample) -> f64 {
         let wanted = upon_the_ground(&sample.links);
         let distance = |links: &Vec<LinkState>| -> f32 {
@@ -167,7 +168,11 @@ impl Reference {
             };
             pairs.map(apart).sum()
         };
-        let distances = self.frames.iter().map(distance).enumerate();
+        let entries = match self.loop_mode {
+            LoopMode::Wrap => self.frames.len(),
+            LoopMode::Clamp => self.frames.len().div_ceil(2),
+        };
+        let distances = self.frames[..entries].iter().map(distance).enumerate();
         let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
         nearest.map_or(0.0, |(frame, _)| frame as f64 / self.rate)
     }

@@ -146,7 +146,8 @@ pub struct Setting {
     pub perturbations: Perturbations,
     /// Start at any phase (reference state initialisation), not only at the first frame.
     pub start_anywhere: bool,
-    /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it.
+    /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
+    /// [`Setting::start_anywhere`].
     pub adaptive_starts: f64,
     /// Longest episode in training, seconds.
     pub episode_s: f64,
@@ -162,7 +163,7 @@ impl Default for Setting {
             terminations: Terminations::default(),
             perturbations: Perturbations::default(),
             start_anywhere: true,
-            adaptive_starts: 0.5,
+            adaptive_starts: 0.25,
             episode_s: 10.0,
         }
     }

@@ -1,6 +1,6 @@
 //! `mimic replay`: an agent with its reference, or a motion alone, in the rerun viewer.
 
-use crate::args::{ImportArgs, RetargetArgs, at_least_one, positive};
+use crate::args::{ImportArgs, RetargetArgs, at_least_one};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::output::{make_room, result_path};
@@ -19,6 +19,13 @@ Examples:
   mimic replay walk.fbx --save walk.rrd     imports and retargets first; open it with `rerun walk.rrd`
   mimic replay walk-and-run --rerun --sequence walk,run,walk   one policy, from one motion into the next
   mimic replay kick --connect 127.0.0.1:9876";
+
+/// Every frame is held in memory.
+const MOST_SECONDS: f64 = 3600.0;
+
+fn seconds(text: &str) -> Result<f64, String> {
+    runs::at_most(text, MOST_SECONDS, "seconds")
+}
 
 /// Metres between agent and reference when they stand side by side.
 const BESIDE: f64 = 1.2;
@@ -40,7 +47,7 @@ pub struct Args {
     #[arg(long)]
     beside: bool,
     /// Seconds to show of a looping motion that a run's agent performs [default: 10, in a sequence 4 each]
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
     /// Which motion to show, by number from 1, of a run that learned several [default: 1]
     #[arg(long, value_name = "N", value_parser = at_least_one)]

@@ -55,11 +55,11 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
         (&["--take", "1"], "import options don't apply"),
         (
             &["--skeleton", "humanoid"],
-            "`--skeleton` and `--map` don't apply",
+            "`--skeleton`, `--map` and `--weight` don't apply",
         ),
         (
             &["--map", "map.json"],
-            "`--skeleton` and `--map` don't apply",
+            "`--skeleton`, `--map` and `--weight` don't apply",
         ),
     ] {
         let line = [&["replay", "sway", "--save", "a.rrd"], flags].concat();
@@ -109,11 +109,27 @@ fn motions_of_a_run_are_shown_one_after_the_other() {
     let clip = fs::read(bench.path("sway.txt")).expect("the clip is there");
     bench.write("first.txt", &clip);
     bench.write("second.txt", &clip);
+    // The first goes on; the second ends, and is played to its end.
+    let ending = [
+        "import",
+        "second.txt",
+        "--loop",
+        "clamp",
+        "--out",
+        "second.clip",
+    ];
+    bench.mimic(&ending).assert().success();
     bench.write(
         "small.json",
         br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 64, "hidden": [8] }"#,
     );
-    let train = ["train", "first.txt", "second.txt", "--preset", "small.json"];
+    let train = [
+        "train",
+        "first.txt",
+        "second.clip",
+        "--preset",
+        "small.json",
+    ];
     bench.mimic(&train).assert().success();
     let line = [
         "replay",
@@ -125,8 +141,14 @@ fn motions_of_a_run_are_shown_one_after_the_other() {
     ];
     let shown = bench.json(&[&line[..], &["first,sec,first"]].concat());
     assert_eq!(shown["agent"], true);
-    assert_eq!(shown["frames"], 18);
-    for (wrong, reason) in [("third", "no motion"), ("s", "several motions")] {
+    // Of the second all 31 frames but what comes before its nearest moment, in its first half.
+    let frames = shown["frames"].as_u64().expect("a number");
+    assert!((6 + 15 + 6..=6 + 31 + 6).contains(&frames), "{frames}");
+    for (wrong, reason) in [
+        ("third", "no motion"),
+        ("s", "several motions"),
+        ("first,", "no motion"),
+    ] {
         let said = bench.complaint(&[&line[..], &[wrong]].concat(), 2);
         assert!(
             said.contains(reason) && said.contains("first, second"),

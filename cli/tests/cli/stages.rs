@@ -177,3 +177,48 @@ fn damaged_clips_and_motions_are_named() {
         }
     }
 }
+
+#[test]
+fn a_slot_can_count_more() {
+    let bench = Workbench::with_clip();
+    let line = [
+        "retarget",
+        "sway.txt",
+        "--out",
+        "head.motion",
+        "--weight",
+        "head=3",
+    ];
+    bench.mimic(&line).assert().success();
+    bench
+        .mimic(&["retarget", "sway.txt", "--out", "sway.motion"])
+        .assert()
+        .success();
+    let read = |name: &str| std::fs::read(bench.path(name)).expect("it was written");
+    assert_ne!(read("head.motion"), read("sway.motion"));
+    for (wrong, reason) in [
+        ("tail=1", "there is no slot `tail`"),
+        ("head", "head=3"),
+        ("head=x", "no number"),
+        ("head=-1", "0 to 100"),
+    ] {
+        let output = bench
+            .mimic(&["retarget", "sway.txt", "--weight", wrong])
+            .assert()
+            .code(2);
+        let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert!(said.contains(reason), "{said}");
+    }
+    let said = bench.complaint(
+        &[
+            "replay",
+            "sway.motion",
+            "--save",
+            "a.rrd",
+            "--weight",
+            "head=2",
+        ],
+        2,
+    );
+    assert!(said.contains("`--weight` doesn't apply"), "{said}");
+}

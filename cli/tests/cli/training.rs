@@ -245,6 +245,7 @@ fn numbers_out_of_range_are_wrong_usage() {
         (&["train", "sway.txt", "--minutes", "1e20"][..], "at most"),
         (&["bench", "--seconds", "1e20"], "at most"),
         (&["eval", "--seconds", "1e20"], "at most"),
+        (&["replay", "--rerun", "--seconds", "1e20"], "at most"),
         (&["eval", "--threads", "0"], "at least 1"),
     ] {
         let output = bench.mimic(line).assert().code(2);

@@ -246,6 +246,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
         turns: bodies
             .iter()
             .map(|b| Turn {
+                slot: Slot::Hips,
                 body: *b,
                 weight: 0.2,
             })
@@ -335,6 +336,63 @@ fn the_gradient_is_the_derivative_of_the_cost() {
                 }
             }
         }
+    }
+}
+
+/// Mean distance of the left hand from its goal, metres, when it counts `weight` times; the goals ask for more than the
+/// humanoid's proportions can give.
+fn distance_of_hand(weight: f64) -> f64 {
+    let skeleton = humanoid();
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/clips/kick.fbx");
+    let clip = import::load(file, &Default::default()).expect("our own clip reads");
+    let map = joint_map(&clip, &Options::default()).expect("it is a humanoid");
+    let alignment = align::align(&clip, &map, &skeleton).expect("it can be aligned");
+    let model = Model::new(&skeleton);
+    let weights = BTreeMap::from([(Slot::LeftHand, weight)]);
+    let mut goals = Goals::new(&clip, &map, &alignment, &model, &weights);
+    let hand = goals.keys.iter().position(|key| key.slot == Slot::LeftHand);
+    let hand = hand.expect("a left hand");
+    for (f, points) in goals.points.iter_mut().enumerate() {
+        points[hand].z += 0.1 + 0.01 * f as f64 / clip.frames.len() as f64;
+    }
+    let fit = Fit {
+        model: &model,
+        anchors: &vec![Vec::new(); clip.frames.len()],
+        cycle: None,
+        fps: clip.fps,
+    };
+    let fitted = fit.run(&mut goals);
+    let apart = fitted.frames.iter().zip(&goals.points).map(|(qpos, goal)| {
+        let bodies = skeleton.forward(qpos);
+        (bodies[goals.keys[hand].body].translation.vector - goal[hand]).norm()
+    });
+    apart.sum::<f64>() / fitted.frames.len() as f64
+}
+
+#[test]
+fn what_counts_more_is_nearer() {
+    let (little, usual, much) = (
+        distance_of_hand(0.1),
+        distance_of_hand(1.0),
+        distance_of_hand(20.0),
+    );
+    assert!(
+        much < 0.3 * usual && usual < 0.8 * little,
+        "{much} {usual} {little}"
+    );
+}
+
+#[test]
+fn weights_out_of_range_are_refused() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/clips/kick.fbx");
+    let clip = import::load(file, &Default::default()).expect("our own clip reads");
+    for weight in [-1.0, 101.0, f64::NAN] {
+        let options = Options {
+            weights: BTreeMap::from([(Slot::Head, weight)]),
+            ..Options::default()
+        };
+        let refused = retarget(&clip, &humanoid(), &options).expect_err("no such weight");
+        assert!(refused.to_string().contains("`head`"), "{refused}");
     }
 }
 

@@ -79,6 +79,34 @@ fn acrobatics_of_the_same_proportions_stay_near_their_source() {
     }
 }
 
+/// In its flight, but for the velocities of the frames next to the ground, the jump's centre of mass falls freely and its
+/// angular momentum stays. The source's changes by 14 kg·m²/s.
+#[test]
+fn a_jump_falls_and_spins_freely() {
+    let Some(clip) = clip("deepmimic/humanoid3d_jump.txt", None) else {
+        return;
+    };
+    let motion = on_humanoid(&clip).motion;
+    let at = |seconds: f64| (seconds * motion.fps).round() as usize;
+    let flight = at(0.85)..at(1.15);
+    let momenta = &motion.tracks.angular_momentum[flight.clone()];
+    for momentum in momenta {
+        assert!(
+            (momentum - momenta[0]).norm() < 0.2,
+            "{momentum} {}",
+            momenta[0]
+        );
+    }
+    let velocity = &motion.tracks.com_velocity;
+    for f in flight {
+        let acceleration = (velocity[f + 1] - velocity[f - 1]) * (motion.fps / 2.0);
+        assert!(
+            (acceleration + Vector3::z() * crate::motion::GRAVITY).norm() < 0.3,
+            "{f}"
+        );
+    }
+}
+
 #[test]
 fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
     let Some(path) = data("characters/mimickit_humanoid.xml") else {
@@ -128,7 +156,7 @@ fn a_skeleton_rooted_at_its_torso_has_its_hips_where_the_source_has_them() {
     let map = humanoid::map(&clip.joints).unwrap();
     let alignment = align::align(&clip, &map, &skeleton).unwrap();
     let model = Model::new(&skeleton);
-    let goals = Goals::new(&clip, &map, &alignment, &model);
+    let goals = Goals::new(&clip, &map, &alignment, &model, &BTreeMap::new());
     for (f, qpos) in goals.guess.iter().enumerate() {
         let bodies = skeleton.forward(qpos);
         let source = clip.world(f);

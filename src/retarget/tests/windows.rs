@@ -26,6 +26,7 @@ fn swinging(model: &Model) -> Goals {
         weight: 1.0,
     };
     let turn = |b: &usize| Turn {
+        slot: Slot::Hips,
         body: *b,
         weight: 0.3,
     };
