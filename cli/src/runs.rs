@@ -85,8 +85,8 @@ pub fn keep(run: &Run, results: &[Measured]) -> Outcome {
         .map_err(failure)
 }
 
-/// The agent's performance of reference number `which` from its first frame.
-pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
+/// The agent's performance of reference number `which`.
+pub fn record(run: &Run, which: usize, start: Start, seconds: f64) -> Outcome<Recording> {
     let performer: Performer = run.performer().map_err(failure)?;
     let motion = run.motions().get(which).ok_or_else(|| {
         let count = run.motions().len();
@@ -96,8 +96,7 @@ pub fn record(run: &Run, which: usize, seconds: f64) -> Outcome<Recording> {
             which + 1
         ))
     })?;
-    let trace =
-        evaluate::play(&performer, which, Start::At(0.0), seconds, None).map_err(learn_failure)?;
+    let trace = evaluate::play(&performer, which, start, seconds, None).map_err(learn_failure)?;
     shown(run, &motion.name, which, &performer, &trace)
 }
 

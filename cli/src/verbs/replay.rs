@@ -9,6 +9,7 @@ use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
 use crate::runs;
 use crate::viewer::{self, Viewer};
+use mimic::evaluate::Start;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +17,7 @@ const EXAMPLES: &str = "\
 Examples:
   mimic replay --rerun                      the newest run, in the viewer
   mimic replay kick --rerun --beside        the run or clip `kick`, agent and reference side by side
+  mimic replay kick --rerun --phase 0.44    from where `mimic eval` says that it fails
   mimic replay walk.fbx --save walk.rrd     imports and retargets first; open it with `rerun walk.rrd`
   mimic replay walk-and-run --rerun --sequence walk,run,walk   one policy, from one motion into the next
   mimic replay kick --connect 127.0.0.1:9876";
@@ -25,6 +27,15 @@ const MOST_SECONDS: f64 = 3600.0;
 
 fn seconds(text: &str) -> Result<f64, String> {
     runs::at_most(text, MOST_SECONDS, "seconds")
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().map_err(|_| "give a number from 0 to 1")?;
+    if (0.0..=1.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("it lies between 0 and 1".into())
+    }
 }
 
 /// Metres between agent and reference when they stand side by side.
@@ -49,6 +60,9 @@ pub struct Args {
     /// Seconds to show of a looping motion that a run's agent performs [default: 10, in a sequence 4 each]
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
+    /// Where in the motion a run's agent starts, 0 to 1, as `mimic eval` names where it fails [default: 0]
+    #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "sequence")]
+    phase: Option<f64>,
     /// Which motion to show, by number from 1, of a run that learned several [default: 1]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     motion: Option<usize>,
@@ -130,7 +144,8 @@ impl Args {
             return runs::record_sequence(&run, &self.sequence, seconds);
         }
         let which = self.motion.unwrap_or(1) - 1;
-        runs::record(&run, which, self.seconds.unwrap_or(SECONDS))
+        let start = Start::At(self.phase.unwrap_or(0.0));
+        runs::record(&run, which, start, self.seconds.unwrap_or(SECONDS))
     }
 
     fn record_motion(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
@@ -148,6 +163,7 @@ impl Args {
         let given = [
             ("--beside", self.beside),
             ("--seconds", self.seconds.is_some()),
+            ("--phase", self.phase.is_some()),
             ("--motion", self.motion.is_some()),
             ("--sequence", !self.sequence.is_empty()),
         ];

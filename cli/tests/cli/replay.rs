@@ -73,6 +73,7 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
         &["--beside"][..],
         &["--seconds", "3"],
         &["--motion", "2"],
+        &["--phase", "0.5"],
         &["--sequence", "sway"],
     ] {
         let line = [&["replay", "sway.txt", "--save", "a.rrd"], flags].concat();
@@ -96,9 +97,28 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
     let shown = bench.json(&line);
     assert_eq!(shown["agent"], true);
     bench.json(&["replay", "sway", "--save", "over.rrd", "--seconds", "1"]);
+    let late = [
+        "replay",
+        "sway",
+        "--save",
+        "late.rrd",
+        "--seconds",
+        "1",
+        "--phase",
+    ];
+    bench.json(&[&late[..], &["0.5"]].concat());
+    for wrong in ["1.5", "-1", "nan", "x"] {
+        let output = bench
+            .mimic(&[&late[..], &[wrong]].concat())
+            .assert()
+            .code(2);
+        let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert!(said.contains("--phase"), "{said}");
+    }
     let read = |name: &str| fs::read(bench.path(name)).unwrap_or_default();
     assert!(read("beside.rrd").starts_with(b"RRF"));
     assert_ne!(read("beside.rrd").len(), 0);
+    assert_ne!(read("late.rrd"), read("over.rrd"));
     let said = bench.complaint(&["replay", "sway", "--save", "a.rrd", "--motion", "2"], 2);
     assert!(said.contains("no number 2"), "{said}");
 }
