@@ -1,5 +1,6 @@
 //! A run learns the same bits at any number of threads, and after being killed and resumed.
 
+use mimic::clip::LoopMode;
 use mimic::import;
 use mimic::learn::{Config, Plan, Run, Trainer};
 use mimic::motion::Motion;
@@ -34,6 +35,7 @@ fn tiny() -> Plan {
     Plan {
         task: Setting {
             adaptive_starts: 0.5,
+            transitions_s: Some([0.2, 0.4]),
             ..Setting::default()
         },
         ppo: Config {
@@ -122,6 +124,27 @@ fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
         learned(&mut resumed, 2),
         "the resumed run learned something else"
     );
+}
+
+/// An episode that goes over into other motions doesn't end where one of them does.
+#[test]
+fn transitions_go_on_where_a_motion_ends() {
+    let ends = |transitions_s| {
+        let mut plan = tiny();
+        plan.task.transitions_s = transitions_s;
+        plan.horizon = 64;
+        plan.task.terminations.fall = false;
+        plan.task.terminations.distance = None;
+        let mut motions = both();
+        motions
+            .iter_mut()
+            .for_each(|m| m.loop_mode = LoopMode::Clamp);
+        let stage = Stage::new(skeleton()).expect("a stage");
+        let mut trainer = Trainer::new(plan, stage, &motions).expect("a trainer");
+        trainer.iterate().expect("training stays finite").episodes
+    };
+    assert!(ends(None) > 0);
+    assert_eq!(ends(Some([0.5, 1.0])), 0);
 }
 
 #[test]

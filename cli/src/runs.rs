@@ -117,13 +117,27 @@ fn shown(
 }
 
 /// The agent's performance of several of its motions, one after the other, each for `seconds` or to its end.
-pub fn record_sequence(run: &Run, names: &[String], seconds: f64) -> Outcome<Recording> {
+pub fn record_sequence(
+    run: &Run,
+    names: &[String],
+    seconds: f64,
+    printer: &Printer,
+) -> Outcome<Recording> {
     let which: Vec<usize> = names
         .iter()
         .map(|name| number_of(run, name))
         .collect::<Outcome<_>>()?;
     let performer: Performer = run.performer().map_err(failure)?;
-    let trace = evaluate::play_sequence(&performer, &which, seconds).map_err(learn_failure)?;
+    let (trace, begun) =
+        evaluate::play_sequence(&performer, &which, seconds).map_err(learn_failure)?;
+    if trace.failure.is_some() {
+        printer.warn(format!(
+            "the agent fails after {:.1} s, in `{}`, number {begun} of the sequence; going over has to be learned: \
+             `--set 'task.transitions_s=[2,4]'`",
+            trace.survived as f64 / trace.control_hz,
+            names[begun - 1]
+        ));
+    }
     shown(run, &names.join("-"), which[0], &performer, &trace)
 }
 

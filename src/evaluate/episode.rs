@@ -86,7 +86,7 @@ pub fn play(
 }
 
 /// Plays the references of these numbers one after the other, each for `seconds` or to its end, and each from where the
-/// one before has led. It ends early with a failure, as in [`play`].
+/// one before has led. It ends early with a failure, as in [`play`]. Gives also how many of them were begun.
 ///
 /// # Errors
 /// A task of another shape than the policy's.
@@ -94,7 +94,7 @@ pub fn play_sequence(
     performer: &Performer,
     which: &[usize],
     seconds: f64,
-) -> Result<Trace, LearnError> {
+) -> Result<(Trace, usize), LearnError> {
     let setting = rules(performer, f64::MAX, Perturbations::default());
     let first = which.first().copied().unwrap_or(0);
     let mut env = performer.environment(first, &setting);
@@ -113,11 +113,11 @@ pub fn play_sequence(
         for _ in 0..steps {
             trace.advance(performer, &mut env, &mut memory)?;
             if trace.failure.is_some() {
-                return Ok(trace);
+                return Ok((trace, part + 1));
             }
         }
     }
-    Ok(trace)
+    Ok((trace, which.len()))
 }
 
 /// Length of an episode, with room for the end of a motion that has one.

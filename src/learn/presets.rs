@@ -82,6 +82,7 @@ fn deepmimic() -> Plan {
             perturbations: Perturbations::default(),
             start_anywhere: true,
             adaptive_starts: 0.0,
+            transitions_s: None,
             episode_s: 20.0,
         },
         // Section 6; noise and rates as in the authors' program, for they go together: a policy's gradient grows as its
@@ -150,6 +151,7 @@ fn booth2020() -> Plan {
             perturbations: Perturbations::default(),
             start_anywhere: false,
             adaptive_starts: 0.0,
+            transitions_s: None,
             episode_s: 25.0,
         },
         ppo: Config {

@@ -3,7 +3,7 @@
 //! A group is the unit of parallel work. Which environments it holds depends on the configuration alone, never on
 //! the number of threads, and every environment has its own random stream: so the samples are the same everywhere.
 
-use super::random::stream;
+use super::random::{stream, uniform};
 use super::starts::{Place, Starts, Tally};
 use super::{ActWorkspace, FrozenNormalizer, LearnError, Policy, StepEnd, fill_normal};
 use crate::task::{Imitate, Outcome, Reference, Setting, Stage, TERM_NAMES};
@@ -85,12 +85,15 @@ struct Player {
     number: u64,
     rng: ChaCha8Rng,
     episode: Episode,
+    /// Seconds of the episode at which another motion follows.
+    next_change: f64,
 }
 
 /// Environments that step together.
 pub(super) struct Group {
     players: Vec<Player>,
     references: Arc<[Arc<Reference>]>,
+    transitions_s: Option<[f64; 2]>,
     /// Current raw observations, `[environments, observation]`.
     current: Vec<f32>,
     normal: Vec<f32>,
@@ -115,6 +118,7 @@ impl Group {
                 number: number as u64,
                 rng: ChaCha8Rng::seed_from_u64(0),
                 episode: Episode::default(),
+                next_change: f64::INFINITY,
             })
             .collect();
         let width = players[0].env.observation_size();
@@ -124,6 +128,7 @@ impl Group {
             noise: vec![0.0; count * players[0].env.action_size()],
             players,
             references: references.clone(),
+            transitions_s: setting.transitions_s.filter(|_| references.len() > 1),
             workspace: ActWorkspace::default(),
             buffer: Buffer::default(),
         }
@@ -139,6 +144,7 @@ impl Group {
         {
             player.rng = stream(seed, player.number + 1, round);
             player.begin(starts, &self.references);
+            player.plan_change(self.transitions_s);
             player.env.observe(row);
         }
     }
@@ -203,13 +209,15 @@ impl Group {
             self.buffer.tally.failures[bin] +=
                 u32::from(matches!(step.outcome, Outcome::Failed(_)));
             let row = &mut self.current[i * width..(i + 1) * width];
+            let outcome =
+                player.change_in_time(step.outcome, self.transitions_s, actor, &self.references);
             player.env.observe(row);
             player.episode.reward += step.reward;
             player.episode.steps += 1;
             for (sum, term) in self.buffer.terms.iter_mut().zip(step.terms.values()) {
                 *sum += f64::from(term);
             }
-            let (end, final_value) = match step.outcome {
+            let (end, final_value) = match outcome {
                 Outcome::Running => (StepEnd::Continues, 0.0),
                 Outcome::Failed(_) | Outcome::Finished => (StepEnd::Terminated, 0.0),
                 Outcome::TimeLimit => {
@@ -224,9 +232,10 @@ impl Group {
             self.buffer.rewards.push(step.reward);
             self.buffer.ends.push(end);
             self.buffer.final_values.push(final_value);
-            if step.outcome != Outcome::Running {
+            if outcome != Outcome::Running {
                 self.buffer.episodes.push(player.episode);
                 player.begin(actor.starts, &self.references);
+                player.plan_change(self.transitions_s);
                 player.env.observe(row);
             }
         }
@@ -239,6 +248,33 @@ impl Player {
         Place {
             motion: self.motion,
             time: self.env.time(),
+        }
+    }
+
+    /// Goes over into another motion when it is time for that, or where this one ends.
+    fn change_in_time(
+        &mut self,
+        outcome: Outcome,
+        transitions_s: Option<[f64; 2]>,
+        actor: &Actor,
+        references: &[Arc<Reference>],
+    ) -> Outcome {
+        let due = outcome == Outcome::Running && self.env.elapsed() >= self.next_change;
+        if transitions_s.is_none() || !(due || outcome == Outcome::Finished) {
+            return outcome;
+        }
+        self.motion = actor.starts.draw(&mut self.rng).motion;
+        let elapsed = self.env.elapsed();
+        self.env.change_to(&references[self.motion]);
+        self.plan_change(transitions_s);
+        self.next_change += elapsed;
+        Outcome::Running
+    }
+
+    fn plan_change(&mut self, transitions_s: Option<[f64; 2]>) {
+        if let Some([least, most]) = transitions_s {
+            self.next_change = least + uniform(&mut self.rng) * (most - least);
+            self.episode.possible = self.env.longest_steps();
         }
     }
 

@@ -2,16 +2,17 @@
 
 use super::observe::{Scene, observation_size, observe};
 use super::perturb::Disturbance;
-use super::reference::{Reference, Sample, anchor};
+use super::reference::{Reference, Sample};
 use super::reward::{Terms, terms};
 use super::setting::{Actions, Setting};
 use super::stage::Stage;
 use super::terminate::{Failure, failure};
+use super::transition::Transition;
 use crate::clip::LoopMode;
 use crate::sim::{HingeAxis, LinkJoint, LinkState, Target, World};
 use crate::skeleton::Drive;
 use crate::task::Dynamics;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// How an episode stands after a step.
@@ -39,8 +40,8 @@ pub struct Step {
 pub struct Imitate {
     stage: Arc<Stage>,
     reference: Arc<Reference>,
-    /// Carries the whole reference to where it is performed.
-    place: Isometry3<f32>,
+    /// What leads into the reference.
+    transition: Transition,
     setting: Setting,
     world: World,
     time: f64,
@@ -66,7 +67,7 @@ impl Imitate {
             disturbance: None,
             stage,
             reference,
-            place: Isometry3::identity(),
+            transition: Transition::none(),
             setting: *setting,
             time: 0.0,
             started: 0.0,
@@ -95,14 +96,15 @@ impl Imitate {
     }
 
     /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
-    /// and from where and whither the present one has brought the character.
+    /// from where and whither the present one has brought the character, and within a second from its speed to the new
+    /// one's.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         let mut present = self.reference.blank();
         self.wanted(&mut present);
         let time = reference.nearest(&present);
         let mut begun = reference.blank();
         reference.sample(time, &mut begun);
-        self.place = anchor(&present.links[0].pose) * anchor(&begun.links[0].pose).inverse();
+        self.transition = Transition::between(&present, &begun, time);
         self.started += time - self.time;
         self.time = time;
         self.reference = reference.clone();
@@ -116,14 +118,15 @@ impl Imitate {
 
     /// Writes the reference at the present moment.
     pub fn wanted(&self, sample: &mut Sample) {
-        self.reference.sample_at(&self.place, self.time, sample);
+        let place = self.transition.at(self.time);
+        self.reference.sample_at(&place, self.time, sample);
     }
 
     /// Starts an episode in the reference's own state at `time` seconds.
     pub fn reset(&mut self, time: f64) {
         self.time = time;
         self.started = time;
-        self.place = Isometry3::identity();
+        self.transition = Transition::none();
         self.reference.sample(time, &mut self.next);
         self.world.reset(&self.next.links);
         self.dynamics = self.reference.masses().dynamics(self.world.states());
@@ -185,6 +188,13 @@ impl Imitate {
             LoopMode::Clamp => limit.min(self.reference.duration() - self.time),
         };
         (left * self.setting.physics.control_hz - 1e-6)
+            .ceil()
+            .max(1.0)
+    }
+
+    /// Steps of an episode that only the time limit ends.
+    pub fn longest_steps(&self) -> f64 {
+        (self.setting.episode_s * self.setting.physics.control_hz - 1e-6)
             .ceil()
             .max(1.0)
     }
@@ -261,6 +271,11 @@ impl Imitate {
         &self.targets
     }
 
+    /// Seconds since the episode began.
+    pub fn elapsed(&self) -> f64 {
+        self.time - self.started
+    }
+
     /// Time in the reference, seconds.
     pub fn time(&self) -> f64 {
         self.time
@@ -278,11 +293,9 @@ impl Imitate {
     }
 
     fn look_ahead(&mut self) {
-        self.reference.sample_at(
-            &self.place,
-            self.time + self.setting.physics.control_dt(),
-            &mut self.next,
-        );
+        let time = self.time + self.setting.physics.control_dt();
+        let place = self.transition.at(time);
+        self.reference.sample_at(&place, time, &mut self.next);
     }
 
     fn outcome(&self, reward: f32) -> Outcome {

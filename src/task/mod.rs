@@ -14,6 +14,7 @@ mod stage;
 mod terminate;
 #[cfg(test)]
 mod tests;
+mod transition;
 
 pub use dynamics::Dynamics;
 pub use imitate::{Imitate, Outcome, Step};
@@ -24,3 +25,4 @@ pub use reward::{Kernels, TERM_NAMES, Terms};
 pub use setting::{Actions, Observations, Rewards, Setting, TaskError, Terminations};
 pub use stage::{SolePoint, Stage};
 pub use terminate::Failure;
+pub use transition::Placement;

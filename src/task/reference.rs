@@ -3,6 +3,7 @@
 use super::dynamics::{Dynamics, Masses};
 use super::setting::TaskError;
 use super::stage::Stage;
+use super::transition::Placement;
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
@@ -131,23 +132,24 @@ impl Reference {
     /// Writes the reference at `time` seconds into `sample`. A wrapping motion goes on cycle after cycle; an ending
     /// one holds its last frame.
     pub fn sample(&self, time: f64, sample: &mut Sample) {
-        self.sample_at(&Isometry3::identity(), time, sample);
+        self.sample_at(&Placement::own(), time, sample);
     }
 
-    /// The same, with the whole motion moved by `place`: a turn about the vertical and a shift along the ground.
-    pub fn sample_at(&self, place: &Isometry3<f32>, time: f64, sample: &mut Sample) {
+    /// The same at another place.
+    pub fn sample_at(&self, place: &Placement, time: f64, sample: &mut Sample) {
         let (cycle, within) = self.split(time);
         let at = within * self.rate;
         let last = self.frames.len() - 1;
         let frame = (at.floor() as usize).min(last - 1);
         let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
-        let offset = place * self.cycle.offset(cycle).cast::<f32>();
+        let offset = place.pose * self.cycle.offset(cycle).cast::<f32>();
         for (link, (a, b)) in sample
             .links
             .iter_mut()
             .zip(self.frames[frame].iter().zip(&self.frames[frame + 1]))
         {
             *link = moved(&between(a, b, blend), &offset);
+            link.linear += place.velocity;
         }
         sample.dynamics = self.masses.dynamics(&sample.links);
         let nearest = if blend < 0.5 { frame } else { frame + 1 };

@@ -149,6 +149,9 @@ pub struct Setting {
     /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
     /// [`Setting::start_anywhere`].
     pub adaptive_starts: f64,
+    /// Seconds after which an episode goes over into another motion of the run, and after which into the next: least and
+    /// most. `None` keeps it to one.
+    pub transitions_s: Option<[f64; 2]>,
     /// Longest episode in training, seconds.
     pub episode_s: f64,
 }
@@ -164,6 +167,7 @@ impl Default for Setting {
             perturbations: Perturbations::default(),
             start_anywhere: true,
             adaptive_starts: 0.25,
+            transitions_s: None,
             episode_s: 10.0,
         }
     }
@@ -227,7 +231,22 @@ impl Setting {
                 "positive",
             ),
         ];
-        for (name, value, range, text) in checks {
+        let [least, most] = self.transitions_s.unwrap_or([1.0, 1.0]);
+        let transitions = [
+            (
+                "the first of transitions_s",
+                least,
+                0.1..=1e6,
+                "0.1 or more",
+            ),
+            (
+                "the second of transitions_s",
+                most,
+                least..=1e6,
+                "no less than the first",
+            ),
+        ];
+        for (name, value, range, text) in checks.into_iter().chain(transitions) {
             if !range.contains(&value) {
                 return Err(TaskError::Setting {
                     name,

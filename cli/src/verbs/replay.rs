@@ -130,18 +130,18 @@ impl Args {
             None => locate::newest_run(),
         };
         match run {
-            Some(run) => Ok((self.record_run(&run)?, run)),
+            Some(run) => Ok((self.record_run(&run, printer)?, run)),
             None => self.record_motion(library, printer),
         }
     }
 
-    fn record_run(&self, run: &Path) -> Outcome<Recording> {
+    fn record_run(&self, run: &Path, printer: &Printer) -> Outcome<Recording> {
         self.import.refuse_for(run, "a run")?;
         self.retarget.refuse_for(run, "a run")?;
         let run = runs::open(Some(run))?;
         if !self.sequence.is_empty() {
             let seconds = self.seconds.unwrap_or(SECONDS_IN_SEQUENCE);
-            return runs::record_sequence(&run, &self.sequence, seconds);
+            return runs::record_sequence(&run, &self.sequence, seconds, printer);
         }
         let which = self.motion.unwrap_or(1) - 1;
         let start = Start::At(self.phase.unwrap_or(0.0));

@@ -397,7 +397,10 @@ fn a_motion_is_nearest_to_itself_wherever_it_goes_on() {
     let reference = reference.expect("a reference");
     let mut sample = reference.blank();
     let turned = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0);
-    let place = Isometry3::from_parts(Vector3::new(3.0, -1.0, 0.0).into(), turned);
+    let place = Placement {
+        pose: Isometry3::from_parts(Vector3::new(3.0, -1.0, 0.0).into(), turned),
+        velocity: Vector3::zeros(),
+    };
     for time in [0.1, 0.55, 0.9] {
         reference.sample_at(&place, 3.0 * reference.duration() + time, &mut sample);
         let nearest = reference.nearest(&sample);
@@ -431,7 +434,27 @@ fn another_motion_begins_where_the_one_before_has_led() {
     let ((at, ahead), (then, facing)) = (root(&before), root(&after));
     assert!((at - then).norm() < 1e-4);
     assert!(ahead.xy().normalize().dot(&facing.xy().normalize()) > 1.0 - 1e-5);
-    assert!((env.time() - kick.nearest(&before)).abs() < 1e-9);
+    // It begins at the speed of the walk, and after a second has its own.
+    let speed = |sample: &Sample| sample.dynamics.com_velocity.xy();
+    assert!((speed(&after) - speed(&before)).norm() < 1e-4);
+    assert!(speed(&before).norm() > 0.8);
+    assert!((env.elapsed() - 1.0).abs() < 1e-6);
     let left = (kick.duration() - env.time()).min(3.0);
     assert!((env.possible_steps() - (30.0 * left).ceil()).abs() <= 1.0);
+    let begun = env.time();
+    while env.time() < begun + 1.0 {
+        env.step(&action);
+    }
+    let mut alone = env.blank();
+    kick.sample(env.time(), &mut alone);
+    env.wanted(&mut after);
+    let turn = root(&after)
+        .1
+        .xy()
+        .normalize()
+        .dot(&root(&alone).1.xy().normalize());
+    assert!(
+        (speed(&after).norm() - speed(&alone).norm()).abs() < 1e-4,
+        "{turn}"
+    );
 }
