@@ -61,7 +61,13 @@ pub struct Args {
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
     /// Where in the motion a run's agent starts, 0 to 1, as `mimic eval` names where it fails [default: 0]
-    #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "sequence")]
+    #[arg(
+        long,
+        value_name = "SHARE",
+        value_parser = share,
+        allow_negative_numbers = true,
+        conflicts_with = "sequence"
+    )]
     phase: Option<f64>,
     /// Which motion to show, by number from 1, of a run that learned several [default: 1]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
