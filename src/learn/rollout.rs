@@ -143,8 +143,7 @@ impl Group {
             .zip(self.current.chunks_exact_mut(width))
         {
             player.rng = stream(seed, player.number + 1, round);
-            player.begin(starts, &self.references);
-            player.plan_change(self.transitions_s);
+            player.begin(starts, &self.references, self.transitions_s);
             player.env.observe(row);
         }
     }
@@ -234,8 +233,7 @@ impl Group {
             self.buffer.final_values.push(final_value);
             if outcome != Outcome::Running {
                 self.buffer.episodes.push(player.episode);
-                player.begin(actor.starts, &self.references);
-                player.plan_change(self.transitions_s);
+                player.begin(actor.starts, &self.references, self.transitions_s);
                 player.env.observe(row);
             }
         }
@@ -278,7 +276,12 @@ impl Player {
         }
     }
 
-    fn begin(&mut self, starts: &Starts, references: &[Arc<Reference>]) {
+    fn begin(
+        &mut self,
+        starts: &Starts,
+        references: &[Arc<Reference>],
+        transitions_s: Option<[f64; 2]>,
+    ) {
         let Place { motion, time } = starts.draw(&mut self.rng);
         self.motion = motion;
         self.env.imitate(&references[motion], time);
@@ -289,5 +292,6 @@ impl Player {
             possible: self.env.possible_steps(),
             ..Episode::default()
         };
+        self.plan_change(transitions_s);
     }
 }

@@ -262,11 +262,9 @@ impl Trainer {
         // Runs from before starts were counted have none.
         if !state.starts.is_empty() {
             super::check_length("saved starts", state.starts.len(), 2 * self.starts.bins())?;
-        }
-        self.learner.restore(state.learner)?;
-        if !state.starts.is_empty() {
             self.starts.restore(&state.starts);
         }
+        self.learner.restore(state.learner)?;
         self.normalizer = state.normalizer;
         self.iteration = state.iteration;
         self.stale = true;
