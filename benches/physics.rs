@@ -1,8 +1,9 @@
-//! Physics steps a second of one core: both engines, the same character doing the same, in turn.
+//! Physics steps a second of one core: our engine with one character and with eight at once, and rapier, the same
+//! characters doing the same, in turn.
 //!
 //! `cargo bench -p mimic --bench physics [SKELETON]`; `benches/mujoco_physics.py` measures MuJoCo at the same.
 
-use mimic::sim::{Character, Engine, LinkJoint, LinkState, Settings, Target, World};
+use mimic::sim::{Character, Engine, LANES, LinkJoint, LinkState, Settings, Target, World};
 use mimic::skeleton::Skeleton;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::time::Instant;
@@ -23,37 +24,43 @@ fn main() {
         ("flails on the ground", 0.0, 1.0),
         ("flails in the air", 50.0, 1.0),
     ] {
-        let mut rates = [const { Vec::new() }; 2];
+        let cases = [
+            (Engine::Articulated, 1),
+            (Engine::Articulated, LANES),
+            (Engine::Rapier, 1),
+        ];
+        let mut rates = [const { Vec::new() }; 3];
         for _ in 0..ROUNDS {
-            for (engine, rates) in [Engine::Articulated, Engine::Rapier]
-                .into_iter()
-                .zip(&mut rates)
-            {
-                rates.push(rate(&character, &start, engine, (lift, swing)));
+            for (case, rates) in cases.into_iter().zip(&mut rates) {
+                rates.push(rate(&character, &start, case, (lift, swing)));
             }
         }
-        let [own, rapier] = rates.map(|mut rates| {
+        let [one, eight, rapier] = rates.map(|mut rates| {
             rates.sort_by(f64::total_cmp);
             rates[rates.len() / 2]
         });
         println!(
-            "{what:>22}: articulated {own:6.1}, rapier {rapier:6.1}, ratio {:.2}",
-            own / rapier
+            "{what:>22}: articulated {one:6.1}, {LANES} at once {eight:6.1}, rapier {rapier:6.1}; to rapier {:.2}, {:.2}",
+            one / rapier,
+            eight / rapier
         );
     }
 }
 
+/// Of `count` characters, each a moment later in its movement than the one before.
 fn rate(
     character: &Character,
     start: &[LinkState],
-    engine: Engine,
+    (engine, count): (Engine, usize),
     (lift, swing): (f32, f32),
 ) -> f64 {
     let settings = Settings {
         engine,
         ..Settings::default()
     };
-    let mut world = World::new(character, settings);
+    let new = |_| World::new(character, settings);
+    let mut worlds: Vec<World> = (0..count).map(new).collect();
+    let mut results = vec![Ok(()); count];
     let mut start = start.to_vec();
     for state in &mut start {
         state.pose.translation.z += lift;
@@ -61,14 +68,18 @@ fn rate(
     let (seconds, episodes) = (60, 10);
     let began = Instant::now();
     for _ in 0..episodes {
-        world.reset(&start);
+        worlds.iter_mut().for_each(|world| world.reset(&start));
+        let mut all: Vec<&mut World> = worlds.iter_mut().collect();
         for step in 0..seconds {
-            world.set_targets(&targets(character, step, swing));
-            world.step().expect("it stays finite");
+            for (late, world) in all.iter_mut().enumerate() {
+                world.set_targets(&targets(character, step + late, swing));
+            }
+            World::step_together(&mut all, &mut results);
         }
     }
-    let steps =
-        f64::from(settings.steps_per_control * settings.substeps) * (seconds * episodes) as f64;
+    assert!(results.iter().all(Result::is_ok), "it stays finite");
+    let steps = f64::from(settings.steps_per_control * settings.substeps)
+        * (seconds * episodes * count) as f64;
     steps / began.elapsed().as_secs_f64() / 1e3
 }
 

@@ -96,8 +96,9 @@ pub fn record(run: &Run, which: usize, start: Start, seconds: f64) -> Outcome<Re
             which + 1
         ))
     })?;
-    let trace = evaluate::play(&performer, which, start, seconds, None).map_err(learn_failure)?;
-    shown(run, &motion.name, which, &performer, &trace)
+    let traces = evaluate::play(&performer, which, &[(start, None)], seconds);
+    let traces = traces.map_err(learn_failure)?;
+    shown(run, &motion.name, which, &performer, &traces[0])
 }
 
 fn shown(

@@ -4,7 +4,7 @@ use crate::clip::LoopMode;
 use crate::learn::{LearnError, Memory, Performer};
 use crate::sim::LinkState;
 use crate::task::{
-    Dynamics, Failure, Imitate, Outcome, Perturbations, Reference, Sample, Setting, Stage,
+    Dynamics, Failure, Imitate, Outcome, Perturbations, Reference, Sample, Setting, Stage, Step,
     Terminations, Terms,
 };
 use nalgebra::{Point3, Vector3};
@@ -53,36 +53,74 @@ pub struct Trace {
     pub contact_links: Vec<usize>,
 }
 
-/// Plays reference number `which` from `start`, for `seconds` or to its end, disturbed as `disturbed` says and by its
-/// seed.
+/// How an episode begins, and by which ranges and which seed it is disturbed.
+pub type Opening = (Start, Option<(Perturbations, u64)>);
+
+/// One of the episodes that are played together.
+struct Playing {
+    env: Imitate,
+    trace: Trace,
+    outcome: Outcome,
+}
+
+/// Plays reference number `which` once for each of `openings`, for `seconds` or to its end.
 ///
 /// An episode fails by a fall, or when the bodies are 0.5 m from their reference in the mean, whatever rules the policy
-/// was trained under.
+/// was trained under. Up to [`LANES`](crate::sim::LANES) episodes take little longer than one.
 ///
 /// # Errors
 /// A task of another shape than the policy's.
 pub fn play(
     performer: &Performer,
     which: usize,
-    start: Start,
+    openings: &[Opening],
     seconds: f64,
-    disturbed: Option<(Perturbations, u64)>,
-) -> Result<Trace, LearnError> {
-    let ranges = disturbed.map_or_else(Perturbations::default, |(ranges, _)| ranges);
-    let seconds = episode_s(&performer.references()[which], seconds);
-    let setting = rules(performer, seconds, ranges);
-    let mut env = performer.environment(which, &setting);
-    match start {
-        Start::At(share) => env.reset(share * env.last_start()),
-        Start::Rest => env.reset_at_rest(),
+) -> Result<Vec<Trace>, LearnError> {
+    let open = |opening| Playing::new(performer, which, opening, seconds);
+    let mut all: Vec<Playing> = openings.iter().map(open).collect();
+    let (mut memory, mut actions) = (Memory::default(), Vec::new());
+    loop {
+        let running = all.iter_mut().filter(|p| p.outcome == Outcome::Running);
+        let mut running: Vec<&mut Playing> = running.collect();
+        if running.is_empty() {
+            return Ok(all.into_iter().map(|playing| playing.trace).collect());
+        }
+        actions.clear();
+        for playing in &running {
+            actions.extend_from_slice(performer.act(&playing.env, &mut memory)?);
+        }
+        let agents = running.iter_mut().map(|playing| &mut playing.env);
+        let steps = Imitate::step_together(agents, &actions);
+        for (playing, step) in running.into_iter().zip(steps) {
+            playing.outcome = playing.trace.keep(performer, &playing.env, &step);
+        }
     }
-    if let Some((_, seed)) = disturbed {
-        env.perturb(seed);
+}
+
+impl Playing {
+    fn new(
+        performer: &Performer,
+        which: usize,
+        (start, disturbed): &Opening,
+        seconds: f64,
+    ) -> Self {
+        let ranges = disturbed.map_or_else(Perturbations::default, |(ranges, _)| ranges);
+        let seconds = episode_s(&performer.references()[which], seconds);
+        let setting = rules(performer, seconds, ranges);
+        let mut env = performer.environment(which, &setting);
+        match start {
+            Start::At(share) => env.reset(share * env.last_start()),
+            Start::Rest => env.reset_at_rest(),
+        }
+        if let Some((_, seed)) = disturbed {
+            env.perturb(*seed);
+        }
+        Playing {
+            trace: Trace::new(performer, which, *start, &env),
+            env,
+            outcome: Outcome::Running,
+        }
     }
-    let mut trace = Trace::new(performer, which, start, &env);
-    let mut memory = Memory::default();
-    while trace.advance(performer, &mut env, &mut memory)? == Outcome::Running {}
-    Ok(trace)
 }
 
 /// Plays the references of these numbers one after the other, each for `seconds` or to its end, and each from where the
@@ -111,7 +149,8 @@ pub fn play_sequence(
         let steps = steps.round().clamp(1.0, env.possible_steps()) as usize;
         trace.possible += steps;
         for _ in 0..steps {
-            trace.advance(performer, &mut env, &mut memory)?;
+            let step = env.step(performer.act(&env, &mut memory)?);
+            trace.keep(performer, &env, &step);
             if trace.failure.is_some() {
                 return Ok((trace, part + 1));
             }
@@ -157,14 +196,8 @@ impl Trace {
         }
     }
 
-    /// Acts for one control step and keeps the frame; an episode that failed by its distance goes no further.
-    fn advance(
-        &mut self,
-        performer: &Performer,
-        env: &mut Imitate,
-        memory: &mut Memory,
-    ) -> Result<Outcome, LearnError> {
-        let step = env.step(performer.act(env, memory)?);
+    /// Keeps the frame that a step has led to; an episode that failed by its distance goes no further.
+    fn keep(&mut self, performer: &Performer, env: &Imitate, step: &Step) -> Outcome {
         let mut reference = env.blank();
         env.wanted(&mut reference);
         let far = mean_distance(performer.stage(), env.states(), &reference.links) > LOST_M;
@@ -187,7 +220,7 @@ impl Trace {
             Outcome::Failed(failure) => self.failure = Some(failure),
             _ => self.survived += 1,
         }
-        Ok(outcome)
+        outcome
     }
 }
 

@@ -5,10 +5,11 @@ mod metrics;
 #[cfg(test)]
 mod tests;
 
-pub use episode::{Frame, Start, Trace, play, play_sequence};
+pub use episode::{Frame, Opening, Start, Trace, play, play_sequence};
 pub use metrics::{Digest, Evaluation, Failed, measure};
 
 use crate::learn::{LearnError, Performer};
+use crate::sim::LANES;
 use crate::task::Perturbations;
 use rayon::prelude::*;
 
@@ -51,12 +52,12 @@ pub fn evaluate(
     let disturbed = options.perturbations.into_iter().flat_map(|ranges| {
         (0..count).map(move |n| (Start::At(n as f64 / count as f64), Some((ranges, n as u64))))
     });
-    let all: Vec<_> = phases.chain([rest]).chain(disturbed).collect();
-    let traces: Result<Vec<Trace>, LearnError> = all
-        .into_par_iter()
-        .map(|(start, disturbed)| play(performer, which, start, options.seconds, disturbed))
+    let all: Vec<Opening> = phases.chain([rest]).chain(disturbed).collect();
+    let traces: Result<Vec<Vec<Trace>>, LearnError> = all
+        .par_chunks(LANES)
+        .map(|openings| play(performer, which, openings, options.seconds))
         .collect();
-    let traces = traces?;
+    let traces = traces?.concat();
     let (undisturbed, disturbed) = traces.split_at(count + 1);
     let stage = performer.stage();
     let digest = |traces: &[Trace]| Digest::from(&measure(stage, traces));

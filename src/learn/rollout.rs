@@ -198,12 +198,14 @@ impl Group {
     }
 
     fn step(&mut self, actor: &Actor) -> Result<(), LearnError> {
-        let (width, actions) = (self.width(), self.noise.len() / self.players.len());
+        let width = self.width();
         let first = self.buffer.actions.len() - self.noise.len();
-        for (i, player) in self.players.iter_mut().enumerate() {
-            let from = first + i * actions;
-            let bin = actor.starts.bin(player.place());
-            let step = player.env.step(&self.buffer.actions[from..from + actions]);
+        let bins = self.players.iter().map(|p| actor.starts.bin(p.place()));
+        let bins: Vec<usize> = bins.collect();
+        let agents = self.players.iter_mut().map(|player| &mut player.env);
+        let steps = Imitate::step_together(agents, &self.buffer.actions[first..]);
+        let players = self.players.iter_mut().zip(bins).zip(steps);
+        for (i, ((player, bin), step)) in players.enumerate() {
             self.buffer.tally.steps[bin] += 1;
             self.buffer.tally.failures[bin] +=
                 u32::from(matches!(step.outcome, Outcome::Failed(_)));

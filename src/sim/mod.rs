@@ -10,6 +10,7 @@ mod rapier;
 mod tests;
 mod world;
 
+pub use articulated::LANES;
 pub use character::{Character, HingeAxis, Link, LinkJoint};
 pub use world::{LinkState, Target, World};
 

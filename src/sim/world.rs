@@ -1,6 +1,6 @@
 //! One character on one ground.
 
-use super::articulated::Articulated;
+use super::articulated::{Articulated, LANES, Stepped};
 use super::rapier::Rapier;
 use super::{Character, Diverged, Engine, Settings};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -105,21 +105,38 @@ impl World {
     /// # Errors
     /// [`Diverged`] when a body stopped being finite or left the world; it then needs a reset.
     pub fn step(&mut self) -> Result<(), Diverged> {
-        match &mut self.mover {
-            Mover::Articulated(mover) => {
-                mover.step(&mut self.contacts)?;
-                mover.read(&mut self.states);
+        let mut result = Ok(());
+        World::step_together(&mut [self], std::slice::from_mut(&mut result));
+        result
+    }
+
+    /// Advances worlds of one character and one setting by a control step, each as if alone, to the bit; in far less time
+    /// than one after the other. What [`World::step`] gives is left in `results`.
+    pub fn step_together(worlds: &mut [&mut World], results: &mut [Result<(), Diverged>]) {
+        for (worlds, results) in worlds.chunks_mut(LANES).zip(results.chunks_mut(LANES)) {
+            let mut stepped: Vec<Stepped> = Vec::with_capacity(LANES);
+            for (world, result) in worlds.iter_mut().zip(results.iter_mut()) {
+                match &mut world.mover {
+                    Mover::Articulated(mover) => stepped.push(Stepped {
+                        mover,
+                        states: &mut world.states,
+                        contacts: &mut world.contacts,
+                        result,
+                    }),
+                    Mover::Rapier(mover) => {
+                        *result = mover.step();
+                        if result.is_ok() {
+                            mover.read(&mut world.states, &mut world.contacts);
+                        }
+                    }
+                }
             }
-            Mover::Rapier(mover) => {
-                mover.step()?;
-                mover.read(&mut self.states, &mut self.contacts);
+            Articulated::step(&mut stepped);
+            for (world, result) in worlds.iter().zip(results) {
+                if !world.states.iter().all(is_near) {
+                    *result = Err(Diverged);
+                }
             }
-        }
-        let near = |s: &LinkState| s.pose.translation.vector.norm() < FARTHEST;
-        if self.states.iter().all(near) {
-            Ok(())
-        } else {
-            Err(Diverged)
         }
     }
 
@@ -140,3 +157,7 @@ impl World {
 
 /// Metres from the origin beyond which a character is lost.
 const FARTHEST: f32 = 1e4;
+
+fn is_near(state: &LinkState) -> bool {
+    state.pose.translation.vector.norm() < FARTHEST
+}

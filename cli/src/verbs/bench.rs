@@ -156,20 +156,24 @@ impl Bench {
         })
     }
 
-    /// Integrations of joints and contacts, at `physics_hz`, of a character per thread that falls to the ground.
+    /// Integrations of joints and contacts, at `physics_hz`, of characters that fall to the ground; each thread steps as
+    /// many at once as in training.
     fn physics(&self) -> Outcome<f64> {
         let settings = self.plan.task.physics;
         let mut first = self.reference.blank();
         self.reference.sample(0.0, &mut first);
         self.on_all_threads(|| {
-            let mut world = World::new(&self.stage.character, settings);
-            world.reset(&first.links);
+            let new = || World::new(&self.stage.character, settings);
+            let mut worlds: Vec<World> = (0..self.plan.group).map(|_| new()).collect();
+            let mut results = vec![Ok(()); worlds.len()];
             self.count(|| {
+                worlds.iter_mut().for_each(|w| w.reset(&first.links));
+                let mut all: Vec<&mut World> = worlds.iter_mut().collect();
                 for _ in 0..settings.control_hz as usize {
-                    world.step().map_err(broken)?;
+                    World::step_together(&mut all, &mut results);
+                    results.iter().try_for_each(|r| r.map_err(broken))?;
                 }
-                world.reset(&first.links);
-                Ok(settings.physics_hz() as u64)
+                Ok(settings.physics_hz() as u64 * all.len() as u64)
             })
         })
     }
@@ -177,16 +181,19 @@ impl Bench {
     /// Control steps with observation, reward and reference, without a network.
     fn environment(&self) -> Outcome<f64> {
         self.on_all_threads(|| {
-            let mut env = Imitate::new(self.stage.clone(), self.reference.clone(), &self.plan.task);
-            let action = vec![0.0; env.action_size()];
-            let mut observation = vec![0.0; env.observation_size()];
-            env.reset(0.0);
+            let new = || Imitate::new(self.stage.clone(), self.reference.clone(), &self.plan.task);
+            let mut envs: Vec<Imitate> = (0..self.plan.group).map(|_| new()).collect();
+            let actions = vec![0.0; envs.len() * envs[0].action_size()];
+            let mut observation = vec![0.0; envs[0].observation_size()];
             self.count(|| {
-                env.observe(&mut observation);
-                if env.step(&action).outcome != mimic::task::Outcome::Running {
-                    env.reset(0.0);
+                let steps = Imitate::step_together(envs.iter_mut(), &actions);
+                for (env, step) in envs.iter_mut().zip(&steps) {
+                    if step.outcome != mimic::task::Outcome::Running {
+                        env.reset(0.0);
+                    }
+                    env.observe(&mut observation);
                 }
-                Ok(1)
+                Ok(steps.len() as u64)
             })
         })
     }

@@ -1,387 +1,306 @@
-//! Where the ground pushes, and how hard.
+//! Where the ground pushes on eight characters, and what that does to them.
 //!
-//! Every point near the ground has an impulse, which must stop it from going into the ground, can't pull, and rubs
-//! within Coulomb's cone. All are solved together, by sweeps of projected Gauss-Seidel. What an impulse on one body
-//! does to the twist of another, J M⁻¹ J'ᵀ (the Delassus operator), is computed for whole bodies, six by six: points of a
-//! body share it. The drives are in it too, as they are in M.
+//! What an impulse on one body does to the twist of another, J M⁻¹ J'ᵀ (the Delassus operator), is computed for whole
+//! bodies, six by six: points of a body share it. The drives are in it too, as they are in M. Every body that any of the
+//! eight has near the ground is computed for all of them; the points then are each character's own.
 
+use super::algebra::Vec3;
 use super::dynamics::Dynamics;
-use super::pose::{Place, Pose, four, three};
+use super::ground::{Ground, NEAR};
+use super::lanes::{LANES, Lanes};
+use super::pose::Pose;
+use super::solve::{Point, Solver, Twist};
 use super::spatial::{Force, Motion};
-use super::tree::Tree;
+use super::state::State;
+use super::tree::{Node, Tree};
 use nalgebra::{Matrix3, Vector3};
 use wide::f32x4;
 
-/// Points nearer to the ground than this at the end of a step are looked at, metres.
-const NEAR: f32 = 0.005;
-/// Share of a depth that is taken back in one step (the error reduction parameter), and the fastest that it may be, m/s.
-const ERROR_REDUCTION: f32 = 0.2;
-const FASTEST: f32 = 0.5;
-/// Added to a hard point's own response, as a share of it (constraint force mixing): of redundant points, each bears its
-/// part.
-const FORCE_MIXING: f32 = 1e-3;
-/// Of soft contacts, as MuJoCo's have it: how much of its acceleration a point is given at the surface, and below this
-/// depth, metres.
-const IMPEDANCE: [f32; 2] = [0.9, 0.95];
-const SURFACE: f32 = 0.001;
-/// Most passes over all points, which start from the impulses of the step before; and the change, m/s, below which a
-/// pass is the last.
-const SWEEPS: usize = 12;
-const STILL: f32 = 1e-4;
-
-/// What the ground is to one step.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ground {
-    /// Seconds of the step.
-    pub dt: f32,
-    /// Factor of everyone's friction.
-    pub friction: f32,
-    /// Seconds in which it yields; 0 where it is hard.
-    pub yielding: f32,
-}
-
-/// Twist of a body: its angular velocity, and that of its frame's origin.
-type Twist = [f32x4; 2];
-
-/// A body with points near the ground.
-#[derive(Clone, Copy, Debug)]
-struct ContactBody {
-    node: usize,
-    twist: Twist,
-    /// Moment about its origin and force: sum of its points' impulses.
-    wrench: [f32; 6],
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Point {
-    body: usize,
-    /// From the body's origin.
-    arm: Vector3<f32>,
-    /// Velocity that it is brought to; upwards it may have more.
-    wanted: Vector3<f32>,
-    /// Added to its response, as a share of it.
-    softness: f32,
-    friction: f32,
-    impulse: Vector3<f32>,
-    /// Its velocity for each impulse on itself.
-    response: Matrix3<f32>,
-    /// Which point of the tree it is.
-    id: usize,
-}
-
 /// Contacts of one step.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Contacts {
-    bodies: Vec<ContactBody>,
-    points: Vec<Point>,
+#[derive(Clone, Debug)]
+pub(super) struct Contacts<L> {
+    /// By lane.
+    solvers: Vec<Solver>,
+    friction: [f32; LANES],
+    /// Nodes that any lane has near the ground.
+    bodies: Vec<usize>,
     /// `[bodies, width]`: halved Jacobians of their twists, along their paths.
-    halves: Vec<[f32x4; 6]>,
+    halves: Vec<[L; 6]>,
     width: usize,
+    /// `[bodies]`: twists without contacts, then the ground's wrenches.
+    twists: Vec<[L; 6]>,
+    wrenches: Vec<[L; 6]>,
     /// `[bodies, bodies]`: twist of the first for each part of the wrench on the second.
-    coupling: Vec<[Twist; 6]>,
-    /// By id, of the last step.
-    last: Vec<Vector3<f32>>,
+    coupling: Vec<[[L; 6]; 6]>,
 }
 
-impl Contacts {
+impl<L: Lanes> Contacts<L> {
     pub fn new(tree: &Tree) -> Self {
-        let points: usize = tree.nodes.iter().map(|node| node.points.len()).sum();
         Contacts {
+            solvers: vec![Solver::default(); LANES],
+            friction: [1.0; LANES],
+            bodies: Vec::new(),
+            halves: Vec::new(),
             width: tree.nodes.iter().map(|n| n.path.len()).max().unwrap_or(0),
-            last: vec![Vector3::zeros(); points],
-            ..Contacts::default()
+            twists: Vec::new(),
+            wrenches: Vec::new(),
+            coupling: Vec::new(),
         }
     }
 
-    /// Forgets the steps before.
-    pub fn reset(&mut self) {
-        self.last.fill(Vector3::zeros());
+    /// Takes a character's impulses, which [`Contacts::give`] gives back.
+    pub fn take(&mut self, lane: usize, state: &mut State) {
+        std::mem::swap(&mut self.solvers[lane].last, &mut state.impulses);
+        self.friction[lane] = state.friction;
     }
 
-    /// Adds to the half solution what keeps the character out of the ground.
-    pub fn resolve(&mut self, tree: &Tree, pose: &Pose, dynamics: &mut Dynamics, ground: &Ground) {
-        self.find(tree, pose, &dynamics.motions, ground);
-        if self.points.is_empty() {
-            self.reset();
+    pub fn give(&mut self, lane: usize, state: &mut State) {
+        std::mem::swap(&mut self.solvers[lane].last, &mut state.impulses);
+    }
+
+    /// Which points of the first `lanes` characters are near the ground.
+    #[inline(always)]
+    pub fn find(
+        &mut self,
+        tree: &Tree,
+        pose: &Pose<L>,
+        motions: &[Motion<L>],
+        (ground, lanes): (&Ground, usize),
+    ) {
+        self.bodies.clear();
+        self.solvers.iter_mut().for_each(Solver::clear);
+        let (mut id, used) = (0, (1 << lanes) - 1);
+        for (i, node) in tree.nodes.iter().enumerate() {
+            if reaches_ground(node, pose, &motions[i], (i, ground.dt)) & used != 0 {
+                self.find_points(tree, pose, &motions[i], (ground, used), (i, id));
+            }
+            id += node.points.len();
+        }
+        for solver in &mut self.solvers[..lanes] {
+            if solver.points.is_empty() {
+                solver.last.fill(Vector3::zeros());
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn find_points(
+        &mut self,
+        tree: &Tree,
+        pose: &Pose<L>,
+        motion: &Motion<L>,
+        (ground, used): (&Ground, u32),
+        (i, first): (usize, usize),
+    ) {
+        let (node, place) = (&tree.nodes[i], &pose.places[i]);
+        let (dt, near) = (L::splat(ground.dt), L::splat(NEAR));
+        let mut touched = false;
+        for (n, (point, radius)) in node.points.iter().enumerate() {
+            let mut arm = place.matrix.times(&Vec3::splat(point));
+            arm.z -= L::splat(*radius);
+            let gap = arm.z + place.origin.z + pose.origin.z;
+            let velocity = motion.at(&(place.origin + arm));
+            let mut close = gap.min(gap + dt * velocity.z).below(near).bits() & used;
+            touched |= close != 0;
+            while close != 0 {
+                let lane = close.trailing_zeros() as usize;
+                close &= close - 1;
+                let (wanted, softness) = ground.wants(gap.of(lane), velocity.of(lane));
+                self.add(
+                    lane,
+                    first + n,
+                    Point {
+                        body: 0,
+                        arm: arm.of(lane),
+                        wanted,
+                        softness,
+                        friction: self.friction[lane] * node.friction,
+                        impulse: Vector3::zeros(),
+                        response: Matrix3::zeros(),
+                        id: first + n,
+                    },
+                );
+            }
+        }
+        if touched {
+            self.bodies.push(i);
+        }
+    }
+
+    /// Of the body that comes next in `bodies`.
+    fn add(&mut self, lane: usize, id: usize, mut point: Point) {
+        let (solver, body) = (&mut self.solvers[lane], self.bodies.len());
+        if solver.bodies.last().is_none_or(|last| last.body != body) {
+            solver.add_body(body);
+        }
+        point.body = solver.bodies.len() - 1;
+        point.impulse = solver.last[id];
+        solver.points.push(point);
+    }
+
+    /// Adds to the half solution what keeps the characters in `open` out of the ground.
+    #[inline(always)]
+    pub fn resolve(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &mut Dynamics<L>, open: u32) {
+        if self.bodies.is_empty() {
             return;
         }
         self.halve(tree, pose, dynamics);
         self.couple(tree);
-        self.respond();
-        self.solve();
+        self.wrenches.clear();
+        self.wrenches.resize(self.bodies.len(), [L::ZERO; 6]);
+        for lane in (0..LANES).filter(|lane| open >> lane & 1 == 1) {
+            self.solve(lane);
+        }
         self.apply(tree, &mut dynamics.change);
     }
 
-    fn find(&mut self, tree: &Tree, pose: &Pose, motions: &[Motion], ground: &Ground) {
-        self.bodies.clear();
-        self.points.clear();
-        let mut id = 0;
-        for (i, node) in tree.nodes.iter().enumerate() {
-            let (place, motion) = (&pose.places[i], &motions[i]);
-            let fastest = motion.angular.norm() * node.reach - motion.at(&place.origin).z;
-            let lowest = place.origin.z + pose.origin.z - node.reach;
-            if lowest - ground.dt * fastest.max(0.0) > NEAR {
-                id += node.points.len();
-                continue;
-            }
-            let friction = ground.friction * node.friction;
-            let first = self.points.len();
-            for (point, radius) in &node.points {
-                let mut arm = place.matrix * point;
-                arm.z -= radius;
-                let gap = arm.z + place.origin.z + pose.origin.z;
-                let velocity = motion.at(&(place.origin + arm));
-                if gap < NEAR || gap + ground.dt * velocity.z < NEAR {
-                    self.add(arm, ground.wants(gap, velocity), friction, id);
-                }
-                id += 1;
-            }
-            if self.points.len() > first {
-                self.bodies.push(body(i, place, motion));
-            }
-        }
-    }
-
-    fn add(
-        &mut self,
-        arm: Vector3<f32>,
-        (wanted, softness): (Vector3<f32>, f32),
-        friction: f32,
-        id: usize,
-    ) {
-        self.points.push(Point {
-            body: self.bodies.len(),
-            arm,
-            wanted,
-            softness,
-            friction,
-            impulse: self.last[id],
-            response: Matrix3::zeros(),
-            id,
-        });
-    }
-
-    /// Halves the Jacobians of the bodies, and adds to their twists what the step does without contacts.
-    fn halve(&mut self, tree: &Tree, pose: &Pose, dynamics: &Dynamics) {
+    /// Halves the Jacobians of the bodies, and takes their twists from what the step does without contacts.
+    #[inline(always)]
+    fn halve(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &Dynamics<L>) {
         self.halves.clear();
         self.halves
-            .resize(self.bodies.len() * self.width, [f32x4::ZERO; 6]);
+            .resize(self.bodies.len() * self.width, [L::ZERO; 6]);
+        self.twists.clear();
         let halves = self.halves.chunks_exact_mut(self.width);
-        for (body, half) in self.bodies.iter_mut().zip(halves) {
-            let path = &tree.nodes[body.node].path;
-            let origin = &pose.places[body.node].origin;
-            for (half, &block) in half.iter_mut().zip(path) {
-                let [a, b, c] = pose.axes[block].angular;
-                let [x, y, z] = pose.axes[block].at(origin);
-                *half = [a, b, c, x, y, z];
+        for (&body, half) in self.bodies.iter().zip(halves) {
+            let path = &tree.nodes[body].path;
+            let origin = &pose.places[body].origin;
+            for (half, &k) in half.iter_mut().zip(path) {
+                *half = rows(&pose.axes[k], origin);
             }
-            dynamics.matrix.halve_rows(path, &mut half[..path.len()]);
-            let mut sums = [f32x4::ZERO; 6];
-            for (half, &block) in half.iter().zip(path) {
-                for (sum, row) in sums.iter_mut().zip(half) {
-                    *sum += *row * dynamics.change[block];
+            dynamics
+                .factor
+                .halve_rows(tree, path, &mut half[..path.len()]);
+            let mut twist = rows(&dynamics.motions[body], origin);
+            for (half, &k) in half.iter().zip(path) {
+                let change = dynamics.change[k];
+                for i in 0..6 {
+                    twist[i] += half[i] * change;
                 }
             }
-            let change = twist(sums);
-            body.twist[0] += change[0];
-            body.twist[1] += change[1];
+            self.twists.push(twist);
         }
     }
 
+    #[inline(always)]
     fn couple(&mut self, tree: &Tree) {
         let count = self.bodies.len();
         self.coupling.clear();
+        self.coupling.resize(count * count, [[L::ZERO; 6]; 6]);
         for a in 0..count {
-            for b in 0..count {
-                let shared = tree.shared(self.bodies[a].node, self.bodies[b].node);
-                let of = |i: usize| &self.halves[i * self.width..i * self.width + shared];
-                self.coupling.push(std::array::from_fn(|k| {
-                    let mut sums = [f32x4::ZERO; 6];
-                    for (x, y) in of(a).iter().zip(of(b)) {
-                        for (sum, row) in sums.iter_mut().zip(x) {
-                            *sum += *row * y[k];
+            for b in 0..=a {
+                let shared = tree.shared(self.bodies[a], self.bodies[b]);
+                let x = &self.halves[a * self.width..a * self.width + shared];
+                let y = &self.halves[b * self.width..b * self.width + shared];
+                let (mut there, mut back) = ([[L::ZERO; 6]; 6], [[L::ZERO; 6]; 6]);
+                for k in 0..6 {
+                    let mut sums = [L::ZERO; 6];
+                    for (x, y) in x.iter().zip(y) {
+                        for i in 0..6 {
+                            sums[i] += x[i] * y[k];
                         }
                     }
-                    twist(sums)
-                }));
-            }
-        }
-    }
-
-    /// What each point does for itself, and where the impulses of the last step lead.
-    fn respond(&mut self) {
-        let count = self.bodies.len();
-        for i in 0..self.points.len() {
-            let Point {
-                body, arm, impulse, ..
-            } = self.points[i];
-            let own = &self.coupling[body * (count + 1)];
-            for axis in 0..3 {
-                let mut unit = Vector3::zeros();
-                unit[axis] = 1.0;
-                let velocity = at(&answer(own, &wrench(&arm, &unit)), &arm);
-                self.points[i].response.set_column(axis, &velocity);
-            }
-            if impulse != Vector3::zeros() {
-                self.spread(body, &arm, &impulse);
-            }
-        }
-    }
-
-    fn solve(&mut self) {
-        for _ in 0..SWEEPS {
-            let mut largest: f32 = 0.0;
-            for i in 0..self.points.len() {
-                let Point {
-                    body,
-                    arm,
-                    impulse,
-                    response,
-                    ..
-                } = self.points[i];
-                let velocity = at(&self.bodies[body].twist, &arm);
-                let next = self.points[i].next(velocity);
-                let change = next - impulse;
-                if change != Vector3::zeros() {
-                    self.points[i].impulse = next;
-                    self.spread(body, &arm, &change);
-                    largest = largest.max(change.norm() * response[(2, 2)]);
+                    there[k] = sums;
+                    for i in 0..6 {
+                        back[i][k] = sums[i];
+                    }
                 }
+                self.coupling[b * count + a] = back;
+                self.coupling[a * count + b] = there;
             }
-            if largest < STILL {
-                break;
-            }
-        }
-        self.last.fill(Vector3::zeros());
-        for point in &self.points {
-            self.last[point.id] = point.impulse;
         }
     }
 
-    /// Gives an impulse at a point of a body.
-    fn spread(&mut self, body: usize, arm: &Vector3<f32>, impulse: &Vector3<f32>) {
-        let count = self.bodies.len();
-        let wrench = wrench(arm, impulse);
-        for (sum, part) in self.bodies[body].wrench.iter_mut().zip(&wrench) {
-            *sum += part;
+    /// One character's impulses, added up by body.
+    fn solve(&mut self, lane: usize) {
+        let (solver, count) = (&mut self.solvers[lane], self.bodies.len());
+        if solver.points.is_empty() {
+            return;
         }
-        for (a, other) in self.bodies.iter_mut().enumerate() {
-            let change = answer(&self.coupling[a * count + body], &wrench);
-            other.twist[0] += change[0];
-            other.twist[1] += change[1];
+        solver.coupling.clear();
+        for a in 0..solver.bodies.len() {
+            solver.bodies[a].twist = twist(&self.twists[solver.bodies[a].body], lane);
+            solver.bodies[a].wrench = [0.0; 6];
+            for b in 0..solver.bodies.len() {
+                let pair = solver.bodies[a].body * count + solver.bodies[b].body;
+                let columns = &self.coupling[pair];
+                let columns = std::array::from_fn(|k| twist(&columns[k], lane));
+                solver.coupling.push(columns);
+            }
+        }
+        solver.solve();
+        for pressed in &solver.bodies {
+            let parts = self.wrenches[pressed.body].iter_mut();
+            for (part, x) in parts.zip(&pressed.wrench) {
+                part.set(lane, *x);
+            }
         }
     }
 
-    fn apply(&self, tree: &Tree, change: &mut [f32x4]) {
-        for (body, half) in self.bodies.iter().zip(self.halves.chunks_exact(self.width)) {
-            let wrench = body.wrench.map(f32x4::splat);
-            for (half, &block) in half.iter().zip(&tree.nodes[body.node].path) {
-                for (row, part) in half.iter().zip(&wrench) {
-                    change[block] += *row * *part;
+    #[inline(always)]
+    fn apply(&self, tree: &Tree, change: &mut [L]) {
+        let halves = self.halves.chunks_exact(self.width);
+        for ((&body, wrench), half) in self.bodies.iter().zip(&self.wrenches).zip(halves) {
+            for (half, &k) in half.iter().zip(&tree.nodes[body].path) {
+                for i in 0..6 {
+                    change[k] += half[i] * wrench[i];
                 }
             }
         }
     }
 
-    /// The ground's impulse on the character; marks in `pressed` the nodes that push on it.
-    pub fn report(&self, pose: &Pose, pressed: &mut [bool]) -> Force {
-        let mut sum = Force::default();
-        for point in &self.points {
-            let node = self.bodies[point.body].node;
-            pressed[node] |= point.impulse.z > 0.0;
-            sum += Force::at(point.impulse, &(pose.places[node].origin + point.arm));
+    /// The ground's impulses on the characters.
+    pub fn impulse(&self, pose: &Pose<L>) -> Force<L> {
+        let mut sum = Force::ZERO;
+        for (lane, solver) in self.solvers.iter().enumerate() {
+            let [mut moment, mut force] = [Vector3::zeros(); 2];
+            for point in &solver.points {
+                let node = self.bodies[solver.bodies[point.body].body];
+                let at = pose.places[node].origin.of(lane) + point.arm;
+                moment += at.cross(&point.impulse);
+                force += point.impulse;
+            }
+            sum.moment.set(lane, &moment);
+            sum.force.set(lane, &force);
         }
         sum
     }
-}
 
-impl Point {
-    /// Impulse that stops the point, as far as it may, given its velocity under the present one.
-    fn next(&self, velocity: Vector3<f32>) -> Vector3<f32> {
-        let (now, response) = (self.impulse, &self.response);
-        // Softness resists the whole impulse, not only its change.
-        let stopping = |k: usize, velocity: f32| {
-            let own = response[(k, k)];
-            let over = velocity - self.wanted[k] + now[k] * own * self.softness;
-            now[k] - over / (own * (1.0 + self.softness))
-        };
-        let up = stopping(2, velocity.z).max(0.0);
-        let along = |k: usize| stopping(k, velocity[k] + response[(k, 2)] * (up - now.z));
-        let [x, y] = [along(0), along(1)];
-        let (most, length) = (self.friction * up, (x * x + y * y).sqrt());
-        let share = if length > most { most / length } else { 1.0 };
-        Vector3::new(x * share, y * share, up)
+    /// Marks the nodes that push on the ground.
+    pub fn mark(&self, lane: usize, pressed: &mut [bool]) {
+        let solver = &self.solvers[lane];
+        for point in &solver.points {
+            let node = self.bodies[solver.bodies[point.body].body];
+            pressed[node] |= point.impulse.z > 0.0;
+        }
     }
 }
 
-fn body(node: usize, place: &Place, motion: &Motion) -> ContactBody {
-    ContactBody {
-        node,
-        twist: [four(&motion.angular), four(&motion.at(&place.origin))],
-        wrench: [0.0; 6],
-    }
+/// Lanes in which a node may have points near the ground.
+#[inline(always)]
+fn reaches_ground<L: Lanes>(
+    node: &Node,
+    pose: &Pose<L>,
+    motion: &Motion<L>,
+    (i, dt): (usize, f32),
+) -> u32 {
+    let (place, reach) = (&pose.places[i], L::splat(node.reach));
+    let fastest = motion.angular.norm() * reach - motion.at(&place.origin).z;
+    let lowest = place.origin.z + pose.origin.z - reach;
+    let soon = lowest - L::splat(dt) * fastest.max(L::ZERO);
+    L::splat(NEAR).at_least(soon).bits()
 }
 
-/// Sums of the lanes of each.
-fn twist([a, b, c, x, y, z]: [f32x4; 6]) -> Twist {
-    [[a, b, c, f32x4::ZERO], [x, y, z, f32x4::ZERO]].map(|rows| {
-        let [p, q, r, s] = f32x4::transpose(rows);
-        p + q + r + s
-    })
-}
-
-fn wrench(arm: &Vector3<f32>, impulse: &Vector3<f32>) -> [f32; 6] {
-    let moment = arm.cross(impulse);
+/// Of a motion: turning, and velocity at `origin`.
+#[inline(always)]
+fn rows<L: Lanes>(motion: &Motion<L>, origin: &Vec3<L>) -> [L; 6] {
+    let (turning, velocity) = (&motion.angular, motion.at(origin));
     [
-        moment.x, moment.y, moment.z, impulse.x, impulse.y, impulse.z,
+        turning.x, turning.y, turning.z, velocity.x, velocity.y, velocity.z,
     ]
 }
 
-/// Twist that a wrench makes.
-fn answer(coupling: &[Twist; 6], wrench: &[f32; 6]) -> Twist {
-    let mut sum = [f32x4::ZERO; 2];
-    for (column, part) in coupling.iter().zip(wrench) {
-        let part = f32x4::splat(*part);
-        sum[0] += column[0] * part;
-        sum[1] += column[1] * part;
-    }
-    sum
-}
-
-/// Velocity at a point of a body.
-fn at(twist: &Twist, arm: &Vector3<f32>) -> Vector3<f32> {
-    three(twist[1]) + three(twist[0]).cross(arm)
-}
-
-impl Ground {
-    /// Velocity that a point `gap` above the ground is brought to, and how softly.
-    fn wants(&self, gap: f32, velocity: Vector3<f32>) -> (Vector3<f32>, f32) {
-        if self.yielding <= 0.0 {
-            return (Vector3::new(0.0, 0.0, wanted(gap / self.dt)), FORCE_MIXING);
-        }
-        // A critically damped spring whose time constant is `yielding` (MuJoCo, "Computation", "Reference"); of less than two
-        // steps it would overshoot.
-        let yielding = self.yielding.max(2.0 * self.dt);
-        let [first, most] = IMPEDANCE;
-        let depth = (-gap).max(0.0);
-        let impedance = first + (most - first) * (depth / SURFACE).min(1.0);
-        let kept = (1.0 - 2.0 * self.dt / (most * yielding)).max(0.0);
-        let back = self.dt * impedance / (most * yielding).powi(2) * depth;
-        let mut wanted = velocity * kept;
-        wanted.z = if gap > 0.0 {
-            wanted.z.min(-gap / self.dt)
-        } else {
-            wanted.z + back
-        };
-        (wanted, (1.0 - impedance) / impedance)
-    }
-}
-
-/// Velocity that leaves no more than `room` metres a second to go, or recovers from a depth.
-fn wanted(room: f32) -> f32 {
-    if room > 0.0 {
-        -room
-    } else {
-        (-room * ERROR_REDUCTION).min(FASTEST)
-    }
+fn twist<L: Lanes>(parts: &[L; 6], lane: usize) -> Twist {
+    let [a, b, c, x, y, z] = std::array::from_fn(|i| parts[i].of(lane));
+    [f32x4::from([a, b, c, 0.0]), f32x4::from([x, y, z, 0.0])]
 }

@@ -1,183 +1,194 @@
-//! Coordinates of a tree, and where they put it.
+//! Coordinates of eight characters, and where they put them.
 
 use super::super::world::LinkState;
-use super::spatial::{Axes, Motion};
+use super::algebra::{Rotation, Turn, Vec3};
+use super::lanes::Lanes;
+use super::spatial::Motion;
+use super::state::State;
 use super::tree::{Joint, Node, Tree};
-use crate::skeleton::twist;
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
-use wide::f32x4;
 
 /// Where a node is in the world, seen from the root's origin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    pub rotation: UnitQuaternion<f32>,
-    pub matrix: Matrix3<f32>,
-    pub origin: Vector3<f32>,
+pub(super) struct Place<L> {
+    pub turn: Turn<L>,
+    pub matrix: Rotation<L>,
+    pub origin: Vec3<L>,
     /// Where its joint turns.
-    pub pivot: Vector3<f32>,
+    pub pivot: Vec3<L>,
 }
 
-impl Place {
-    pub fn point(&self, local: &Vector3<f32>) -> Vector3<f32> {
-        self.origin + self.matrix * local
+impl<L: Lanes> Place<L> {
+    #[inline(always)]
+    pub fn point(&self, local: &Vec3<L>) -> Vec3<L> {
+        self.origin + self.matrix.times(local)
     }
 }
 
 /// Where a tree is and how it moves.
 #[derive(Clone, Debug)]
-pub(super) struct Pose {
+pub(super) struct Pose<L> {
     /// The root's place in the world. All else is relative to it, so that nothing is lost far from the world's origin.
-    pub origin: Vector3<f32>,
-    /// Of every node, in its parent; the root's in the world.
-    pub turns: Vec<UnitQuaternion<f32>>,
+    pub origin: Vec3<L>,
+    /// Of every node that is no hinge, in its parent from how it rests there; the root's in the world.
+    pub turns: Vec<Turn<L>>,
     /// Of the hinges, radians.
-    pub angles: Vec<f32>,
-    /// By block.
-    pub velocity: Vec<f32x4>,
-    pub places: Vec<Place>,
-    /// What a unit of every velocity coordinate does, by block, about the root's origin.
-    pub axes: Vec<Axes>,
+    pub angles: Vec<L>,
+    /// By coordinate.
+    pub velocity: Vec<L>,
+    pub places: Vec<Place<L>>,
+    /// What a unit of every coordinate's velocity does, about the root's origin.
+    pub axes: Vec<Motion<L>>,
 }
 
-impl Pose {
+impl<L: Lanes> Pose<L> {
     pub fn new(tree: &Tree) -> Self {
+        let (nodes, coordinates) = (tree.nodes.len(), tree.coordinates.len());
         let nowhere = Place {
-            rotation: UnitQuaternion::identity(),
-            matrix: Matrix3::identity(),
-            origin: Vector3::zeros(),
-            pivot: Vector3::zeros(),
+            turn: Turn::identity(),
+            matrix: Turn::identity().matrix(),
+            origin: Vec3::ZERO,
+            pivot: Vec3::ZERO,
         };
-        let mut axes = vec![Axes::default(); tree.blocks()];
-        let unit = |k: usize| {
-            f32x4::from(std::array::from_fn(
-                |lane| if lane == k { 1.0 } else { 0.0 },
-            ))
-        };
-        axes[0].linear = [unit(0), unit(1), unit(2)];
-        axes[1].angular = [unit(0), unit(1), unit(2)];
+        let mut axes = vec![Motion::ZERO; coordinates];
+        let one = L::splat(1.0);
+        let units = [
+            Vec3::new(one, L::ZERO, L::ZERO),
+            Vec3::new(L::ZERO, one, L::ZERO),
+            Vec3::new(L::ZERO, L::ZERO, one),
+        ];
+        for (k, unit) in units.into_iter().enumerate() {
+            axes[k].linear = unit;
+            axes[3 + k].angular = unit;
+        }
         Pose {
-            origin: Vector3::zeros(),
-            turns: vec![UnitQuaternion::identity(); tree.nodes.len()],
-            angles: vec![0.0; tree.nodes.len()],
-            velocity: vec![f32x4::ZERO; tree.blocks()],
-            places: vec![nowhere; tree.nodes.len()],
+            origin: Vec3::ZERO,
+            turns: vec![Turn::identity(); nodes],
+            angles: vec![L::ZERO; nodes],
+            velocity: vec![L::ZERO; coordinates],
+            places: vec![nowhere; nodes],
             axes,
         }
     }
 
-    /// Takes the coordinates of `states`; what their joints can't do is left out.
-    pub fn set(&mut self, tree: &Tree, states: &[LinkState]) {
-        for (i, node) in tree.nodes.iter().enumerate() {
-            let state = &states[i];
-            let Some(parent) = node.parent.map(|p| &states[p]) else {
-                self.origin = state.pose.translation.vector;
-                self.turns[i] = state.pose.rotation;
-                self.velocity[0] = four(&state.linear);
-                self.velocity[1] = four(&state.angular);
-                continue;
-            };
-            let turn = node.rest.inverse() * parent.pose.rotation.inverse() * state.pose.rotation;
-            let apart = state.angular - parent.angular;
-            let rate = state.pose.rotation.inverse_transform_vector(&apart);
-            match node.joint {
-                Joint::Hinge(axis, _) => {
-                    self.angles[i] = twist(&turn.cast(), &axis.cast()) as f32;
-                    self.velocity[node.block] = f32x4::from([rate.dot(&axis), 0.0, 0.0, 0.0]);
-                }
-                _ => {
-                    self.turns[i] = turn;
-                    self.velocity[node.block] = four(&rate);
-                }
-            }
+    pub fn take(&mut self, lane: usize, state: &State) {
+        self.origin.set(lane, &state.origin);
+        for (own, turn) in self.turns.iter_mut().zip(&state.turns) {
+            own.set(lane, turn);
         }
-        self.place(tree);
+        for (own, angle) in self.angles.iter_mut().zip(&state.angles) {
+            own.set(lane, *angle);
+        }
+        for (own, rate) in self.velocity.iter_mut().zip(&state.velocity) {
+            own.set(lane, *rate);
+        }
     }
 
-    /// Moves the coordinates on at their velocity for `dt` seconds.
-    pub fn advance(&mut self, tree: &Tree, dt: f32) {
-        for (i, node) in tree.nodes.iter().enumerate() {
-            let rate = three(self.velocity[node.block]) * dt;
-            match node.joint {
-                Joint::Free => {
-                    self.origin += three(self.velocity[0]) * dt;
-                    self.turns[i] =
-                        normalized(UnitQuaternion::from_scaled_axis(rate) * self.turns[i]);
-                }
-                Joint::Ball => {
-                    self.turns[i] =
-                        normalized(self.turns[i] * UnitQuaternion::from_scaled_axis(rate))
-                }
-                Joint::Hinge(..) => self.angles[i] += rate.x,
-            }
+    pub fn give(&self, lane: usize, state: &mut State) {
+        state.origin = self.origin.of(lane);
+        for (turn, own) in state.turns.iter_mut().zip(&self.turns) {
+            *turn = own.of(lane);
         }
-        self.place(tree);
-    }
-
-    /// Places and axes from the coordinates.
-    fn place(&mut self, tree: &Tree) {
-        for (i, node) in tree.nodes.iter().enumerate() {
-            let Some(parent) = node.parent.map(|p| self.places[p]) else {
-                self.places[i].rotation = self.turns[i];
-                self.places[i].matrix = self.turns[i].to_rotation_matrix().into_inner();
-                continue;
-            };
-            if let Joint::Hinge(axis, _) = node.joint {
-                let (sin, cos) = (self.angles[i] * 0.5).sin_cos();
-                let turn = Quaternion::from_parts(cos, axis * sin);
-                self.turns[i] = UnitQuaternion::new_unchecked(turn);
-            }
-            let rotation = parent.rotation * node.rest * self.turns[i];
-            let matrix = rotation.to_rotation_matrix().into_inner();
-            let pivot = parent.point(&node.pivot);
-            let origin = pivot - matrix * node.anchor;
-            self.places[i] = Place {
-                rotation,
-                matrix,
-                origin,
-                pivot,
-            };
-            self.axes[node.block] = match node.joint {
-                Joint::Hinge(axis, _) => Axes::about(&[matrix * axis], &pivot),
-                _ => Axes::about(&[0, 1, 2].map(|k| matrix.column(k).into()), &pivot),
-            };
+        for (angle, own) in state.angles.iter_mut().zip(&self.angles) {
+            *angle = own.of(lane);
+        }
+        for (rate, own) in state.velocity.iter_mut().zip(&self.velocity) {
+            *rate = own.of(lane);
         }
     }
 
     /// States of all nodes in the world.
-    pub fn read(&self, motions: &[Motion], states: &mut [LinkState]) {
+    pub fn read(&self, motions: &[Motion<L>], lane: usize, states: &mut [LinkState]) {
+        let origin = self.origin.of(lane);
         for ((state, place), motion) in states.iter_mut().zip(&self.places).zip(motions) {
-            state.pose.rotation = place.rotation;
-            state.pose.translation.vector = place.origin + self.origin;
-            state.linear = motion.at(&place.origin);
-            state.angular = motion.angular;
+            let (at, angular) = (place.origin.of(lane), motion.angular.of(lane));
+            state.pose.rotation = place.turn.of(lane);
+            state.pose.translation.vector = at + origin;
+            state.linear = motion.linear.of(lane) + angular.cross(&at);
+            state.angular = angular;
+        }
+    }
+
+    /// Moves the coordinates on at their velocity for `dt` seconds.
+    #[inline(always)]
+    pub fn advance(&mut self, tree: &Tree, dt: L) {
+        for (i, node) in tree.nodes.iter().enumerate() {
+            let k = node.first;
+            match node.joint {
+                Joint::Free => {
+                    self.origin += self.rate(k) * dt;
+                    let turn = Turn::by(&(self.rate(k + 3) * dt));
+                    self.turns[i] = turn.times(&self.turns[i]).normalized();
+                }
+                Joint::Ball => {
+                    let turn = Turn::by(&(self.rate(k) * dt));
+                    self.turns[i] = self.turns[i].times(&turn).normalized();
+                }
+                Joint::Hinge(..) => self.angles[i] += self.velocity[k] * dt,
+            }
+        }
+    }
+
+    /// Places and axes from the coordinates.
+    #[inline(always)]
+    pub fn place(&mut self, tree: &Tree) {
+        for (i, node) in tree.nodes.iter().enumerate() {
+            let Some(parent) = node.parent else {
+                self.places[i].turn = self.turns[i];
+                self.places[i].matrix = self.turns[i].matrix();
+                continue;
+            };
+            let parent = self.places[parent];
+            let own = match node.joint {
+                Joint::Hinge(axis, _) => Turn::about(&Vec3::splat(&axis), self.angles[i]),
+                _ => self.turns[i],
+            };
+            let turn = parent.turn.times(&Turn::splat(&node.rest)).times(&own);
+            let matrix = turn.matrix();
+            let pivot = parent.point(&Vec3::splat(&node.pivot));
+            let origin = pivot - matrix.times(&Vec3::splat(&node.anchor));
+            self.places[i] = Place {
+                turn,
+                matrix,
+                origin,
+                pivot,
+            };
+            match node.joint {
+                Joint::Hinge(axis, _) => {
+                    let axis = matrix.times(&Vec3::splat(&axis));
+                    self.axes[node.first] = Motion::about(axis, &pivot);
+                }
+                _ => {
+                    for k in 0..3 {
+                        self.axes[node.first + k] = Motion::about(matrix.0[k], &pivot);
+                    }
+                }
+            }
         }
     }
 
     /// What a node's joint does by itself.
-    pub fn own_motion(&self, i: usize, node: &Node) -> Motion {
-        let (place, rate) = (&self.places[i], self.velocity[node.block]);
+    #[inline(always)]
+    pub fn own_motion(&self, i: usize, node: &Node) -> Motion<L> {
+        let place = &self.places[i];
         match node.joint {
             Joint::Free => Motion {
-                angular: three(rate),
-                linear: three(self.velocity[0]),
+                angular: self.rate(3),
+                linear: self.rate(0),
             },
-            Joint::Ball => Motion::about(place.matrix * three(rate), &place.pivot),
-            Joint::Hinge(axis, _) => {
-                Motion::about(place.matrix * (axis * rate.as_array()[0]), &place.pivot)
+            Joint::Ball => Motion::about(place.matrix.times(&self.rate(node.first)), &place.pivot),
+            Joint::Hinge(..) => {
+                let (axis, rate) = (&self.axes[node.first], self.velocity[node.first]);
+                Motion {
+                    angular: axis.angular * rate,
+                    linear: axis.linear * rate,
+                }
             }
         }
     }
-}
 
-pub(super) fn four(v: &Vector3<f32>) -> f32x4 {
-    f32x4::from([v.x, v.y, v.z, 0.0])
-}
-
-pub(super) fn three(v: f32x4) -> Vector3<f32> {
-    let [x, y, z, _] = v.to_array();
-    Vector3::new(x, y, z)
-}
-
-fn normalized(turn: UnitQuaternion<f32>) -> UnitQuaternion<f32> {
-    UnitQuaternion::new_normalize(turn.into_inner())
+    /// Three velocities in a row.
+    #[inline(always)]
+    fn rate(&self, k: usize) -> Vec3<L> {
+        Vec3::new(self.velocity[k], self.velocity[k + 1], self.velocity[k + 2])
+    }
 }

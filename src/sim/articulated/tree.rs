@@ -1,17 +1,13 @@
 //! What doesn't change while a character moves: its joints, their order, and which of them carry which.
-//!
-//! Velocity coordinates lie in blocks of four, of which a joint uses three or one (the root two blocks, three of
-//! each): so every sum over the coordinates that move a node runs four at a time.
 
 use super::super::character::{Character, Link, LinkJoint};
 use crate::skeleton::{Drive, Shape};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use wide::f32x4;
 
 /// How a node turns in its parent.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joint {
-    /// A block along the world's axes, and one about them.
+    /// Along the world's axes, then about them.
     Free,
     /// About the node's own axes.
     Ball,
@@ -29,9 +25,10 @@ pub(super) struct Node {
     /// Where the joint turns, in the parent's frame and in the link's.
     pub pivot: Vector3<f32>,
     pub anchor: Vector3<f32>,
-    /// Its coordinates' block; the root's second.
-    pub block: usize,
-    /// Blocks that move it, from the root's to its own.
+    /// Its first coordinate, and how many it has.
+    pub first: usize,
+    pub dof: usize,
+    /// Coordinates that move it, from the root's to its own.
     pub path: Vec<usize>,
     pub mass: f32,
     pub com: Vector3<f32>,
@@ -44,23 +41,31 @@ pub(super) struct Node {
     pub reach: f32,
 }
 
-/// Gains of a block; zero where nothing drives a coordinate.
+/// One velocity coordinate.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Coordinate {
+    /// The node whose joint it turns, and its place on that node's path.
+    pub node: usize,
+    pub depth: usize,
+    /// Where its row of a matrix begins.
+    pub row: usize,
+    pub gains: Gains,
+}
+
+/// Zero where nothing drives a coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gains {
-    pub kp: f32x4,
-    pub kd: f32x4,
-    pub limit: f32x4,
+    pub kp: f32,
+    pub kd: f32,
+    pub limit: f32,
 }
 
 /// The nodes, parents before children.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     pub nodes: Vec<Node>,
-    /// One for each block.
-    pub gains: Vec<Gains>,
-    /// Coordinates in use in each block: the first ones.
-    pub used: Vec<usize>,
-    /// `[nodes, nodes]`: how many blocks move both.
+    pub coordinates: Vec<Coordinate>,
+    /// `[nodes, nodes]`: how many coordinates move both.
     shared: Vec<usize>,
 }
 
@@ -68,8 +73,7 @@ impl Tree {
     pub fn new(character: &Character) -> Self {
         let mut tree = Tree {
             nodes: Vec::new(),
-            gains: Vec::new(),
-            used: Vec::new(),
+            coordinates: Vec::new(),
             shared: Vec::new(),
         };
         for link in &character.links {
@@ -77,11 +81,8 @@ impl Tree {
         }
         for a in &tree.nodes {
             let both = |b: &Node| {
-                a.path
-                    .iter()
-                    .zip(&b.path)
-                    .take_while(|(x, y)| x == y)
-                    .count()
+                let pairs = a.path.iter().zip(&b.path);
+                pairs.take_while(|(x, y)| x == y).count()
             };
             tree.shared.extend(tree.nodes.iter().map(both));
         }
@@ -89,35 +90,40 @@ impl Tree {
     }
 
     fn add(&mut self, link: &Link) {
-        let first = self.gains.len();
-        if let LinkJoint::Free = link.joint {
-            self.gains.push(Gains::default());
-            self.used.push(3);
-        }
-        self.gains.push(gains(&link.joint));
-        self.used.push(if let LinkJoint::Hinge { .. } = link.joint {
-            1
-        } else {
-            3
-        });
+        let (first, node_index) = (self.coordinates.len(), self.nodes.len());
         let mut path = link
             .parent
             .map_or_else(Vec::new, |p| self.nodes[p].path.clone());
-        path.extend(first..self.gains.len());
-        self.nodes.push(node(link, path));
+        for gains in gains(&link.joint) {
+            let row = self.coordinates.last().map_or(0, |c| c.row + c.depth + 1);
+            self.coordinates.push(Coordinate {
+                node: node_index,
+                depth: path.len(),
+                row,
+                gains,
+            });
+            path.push(self.coordinates.len() - 1);
+        }
+        self.nodes.push(node(link, first, path));
     }
 
-    /// How many blocks move both nodes: the first ones of either's path.
+    /// The path of a coordinate's node, which begins with its own.
+    #[inline(always)]
+    pub fn path(&self, coordinate: &Coordinate) -> &[usize] {
+        &self.nodes[coordinate.node].path
+    }
+
+    /// How many coordinates move both nodes: the first ones of either's path.
     pub fn shared(&self, a: usize, b: usize) -> usize {
         self.shared[a * self.nodes.len() + b]
     }
 
-    pub fn blocks(&self) -> usize {
-        self.gains.len()
+    pub fn points(&self) -> usize {
+        self.nodes.iter().map(|node| node.points.len()).sum()
     }
 }
 
-fn node(link: &Link, path: Vec<usize>) -> Node {
+fn node(link: &Link, first: usize, path: Vec<usize>) -> Node {
     let tips = link.shapes.iter().flat_map(Shape::tips);
     let points: Vec<(Vector3<f32>, f32)> = tips
         .map(|(at, radius)| (at.coords.cast(), radius as f32))
@@ -132,7 +138,8 @@ fn node(link: &Link, path: Vec<usize>) -> Node {
             .coords
             .cast(),
         anchor: link.anchor.cast(),
-        block: path[path.len() - 1],
+        first,
+        dof: path.last().map_or(0, |last| last + 1 - first),
         path,
         mass: link.mass as f32,
         com: link.com.cast(),
@@ -153,27 +160,22 @@ fn joint(joint: &LinkJoint) -> Joint {
     }
 }
 
-fn gains(joint: &LinkJoint) -> Gains {
-    let drives: &[Drive] = match joint {
-        LinkJoint::Free => &[],
-        LinkJoint::Hinge { drive, .. } => std::slice::from_ref(drive),
-        LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => drives,
-    };
-    let each = |of: fn(&Drive) -> f64| {
+/// Of each coordinate of a joint.
+fn gains(joint: &LinkJoint) -> Vec<Gains> {
+    let of = |drive: &Drive| {
         // What may give no force drives nothing.
-        let of = |drive: &Drive| {
-            if drive.force_limit > 0.0 {
-                of(drive)
-            } else {
-                0.0
-            }
-        };
-        let value = |k: usize| drives.get(k).map_or(0.0, of).min(f64::from(f32::MAX)) as f32;
-        f32x4::from([value(0), value(1), value(2), 0.0])
+        if drive.force_limit <= 0.0 {
+            return Gains::default();
+        }
+        let [kp, kd, limit] =
+            [drive.kp, drive.kd, drive.force_limit].map(|x| x.min(f64::from(f32::MAX)) as f32);
+        Gains { kp, kd, limit }
     };
-    Gains {
-        kp: each(|drive| drive.kp),
-        kd: each(|drive| drive.kd),
-        limit: each(|drive| drive.force_limit),
+    match joint {
+        LinkJoint::Free => vec![Gains::default(); 6],
+        LinkJoint::Hinge { drive, .. } => vec![of(drive)],
+        LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => {
+            drives.iter().map(of).collect()
+        }
     }
 }

@@ -19,6 +19,7 @@ macro_rules! on_both_engines {
 }
 
 mod joints;
+mod together;
 
 use super::*;
 use crate::skeleton::Skeleton;

@@ -1,0 +1,120 @@
+use super::algebra::{Symmetric, Turn, Vec3};
+use super::lanes::{LANES, Lanes, Work, on_widest};
+use super::step::Workspaces;
+use super::*;
+use crate::skeleton::Skeleton;
+use nalgebra::{Matrix3, UnitQuaternion};
+use wide::f32x8;
+
+/// Rotations from none to a full turn and beyond, about axes that differ.
+fn rotation_vectors() -> Vec<Vector3<f32>> {
+    let lengths = [0.0, 1e-30, 1e-12, 1e-4, 0.01, 0.3, 1.2, 1.6, 2.2, 3.0, 3.14];
+    let axis = |i: usize| {
+        let i = i as f32;
+        Vector3::new(i.sin(), (2.3 * i).cos(), (1.7 * i + 0.4).sin()).normalize()
+    };
+    let all = lengths.iter().enumerate();
+    all.map(|(i, length)| axis(i) * *length).collect()
+}
+
+#[test]
+fn turns_by_rotation_vectors_are_those_of_nalgebra() {
+    for v in rotation_vectors() {
+        let expected = UnitQuaternion::from_scaled_axis(v.cast::<f64>());
+        let turn = Turn::<f32x8>::by(&Vec3::splat(&v));
+        let apart = expected.angle_to(&turn.of(5).cast());
+        assert!(apart < 5e-7, "{apart} from the turn by {v:?}");
+        for turn in [
+            turn,
+            Turn {
+                w: -turn.w,
+                v: -turn.v,
+            },
+        ] {
+            let back = turn.vector().of(3);
+            assert!((back - v).norm() < 2e-6, "{v:?} became {back:?}");
+        }
+    }
+}
+
+#[test]
+fn turns_about_an_axis_are_those_of_nalgebra_at_any_angle() {
+    let axis = Vector3::new(0.48, -0.6, 0.64);
+    for k in -400..400 {
+        let angle = k as f32 * 0.0731;
+        let turn = Turn::<f32x8>::about(&Vec3::splat(&axis), f32x8::splat(angle));
+        let unit = nalgebra::Unit::new_normalize(axis.cast::<f64>());
+        let expected = UnitQuaternion::from_axis_angle(&unit, f64::from(angle));
+        let apart = expected.angle_to(&turn.of(0).cast());
+        assert!(
+            apart < 1e-6 * (1.0 + f64::from(angle.abs())),
+            "{apart} at {angle}"
+        );
+    }
+}
+
+#[test]
+fn a_symmetric_matrix_is_turned_and_solved_as_in_nalgebra() {
+    let m = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.5, 0.2, -0.1, 0.2, 0.7);
+    let lanes = Symmetric::<f32x8> {
+        xx: f32x8::splat(m.m11),
+        yy: f32x8::splat(m.m22),
+        zz: f32x8::splat(m.m33),
+        xy: f32x8::splat(m.m12),
+        xz: f32x8::splat(m.m13),
+        yz: f32x8::splat(m.m23),
+    };
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.0, 0.7));
+    let r = turn.to_rotation_matrix().into_inner();
+    let v = Vector3::new(0.5, -1.0, 2.0);
+    let turned = lanes.turned(&Turn::splat(&turn).matrix());
+    let expected = r * m * r.transpose() * v;
+    assert!((turned.times(&Vec3::splat(&v)).of(1) - expected).norm() < 1e-5);
+    let solved = turned.solve(&Vec3::splat(&expected)).of(7);
+    assert!((solved - v).norm() < 1e-5, "{solved:?}");
+}
+
+/// What a falling, flailing character does on one kind of lanes.
+struct Fall<'a>(&'a mut Vec<LinkState>);
+
+impl Work for Fall<'_> {
+    fn run<L: Lanes>(self) {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
+        let character = Character::new(&skeleton).expect("it can be simulated");
+        let mut mover = Articulated::new(&character, Settings::default());
+        let rest = skeleton.rest_qpos();
+        let mut states = character.states(&skeleton, &rest, &vec![0.3; skeleton.nv]);
+        mover.reset(&states);
+        let mut contacts = vec![false; character.links.len()];
+        let (mut workspaces, mut result) = (Workspaces::default(), Ok(()));
+        for _ in 0..40 {
+            let one = Stepped {
+                mover: &mut mover,
+                states: &mut states,
+                contacts: &mut contacts,
+                result: &mut result,
+            };
+            workspaces.step_on::<L>(&mut [one]);
+        }
+        assert!(result.is_ok() && contacts.contains(&true), "it never fell");
+        *self.0 = states;
+    }
+}
+
+#[test]
+fn all_kinds_of_lanes_give_the_same_bits() {
+    let [mut widest, mut portable] = [const { Vec::new() }; 2];
+    on_widest(Fall(&mut widest));
+    Fall(&mut portable).run::<f32x8>();
+    assert_eq!(widest, portable);
+}
+
+#[test]
+fn masks_choose_by_lane() {
+    let mask = f32x8::mask(0b1010_0110);
+    assert_eq!(mask.bits(), 0b1010_0110);
+    let chosen = mask.choose(f32x8::splat(1.0), f32x8::ZERO);
+    for lane in 0..LANES {
+        assert_eq!(chosen.of(lane), (0b1010_0110 >> lane & 1) as f32);
+    }
+}
