@@ -1,5 +1,8 @@
 //! Long trajectories are solved window by window.
 
+use super::super::cost::Problem;
+use super::super::goals::{Key, Turn};
+use super::super::solve::Solver;
 use super::*;
 use std::f64::consts::TAU;
 
