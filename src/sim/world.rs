@@ -110,32 +110,41 @@ impl World {
         result
     }
 
-    /// Advances worlds of one character and one setting by a control step, each as if alone, to the bit; in far less time
-    /// than one after the other. What [`World::step`] gives is left in `results`.
+    /// Advances worlds of one character and one setting by a control step, each as if alone; in far less time than one
+    /// after the other. What [`World::step`] gives is left in `results`, one for each.
+    ///
+    /// # Panics
+    /// If there aren't as many results as worlds, or the worlds are of different kinds.
     pub fn step_together(worlds: &mut [&mut World], results: &mut [Result<(), Diverged>]) {
+        assert_eq!(worlds.len(), results.len(), "one result for each world");
         for (worlds, results) in worlds.chunks_mut(LANES).zip(results.chunks_mut(LANES)) {
-            let mut stepped: Vec<Stepped> = Vec::with_capacity(LANES);
-            for (world, result) in worlds.iter_mut().zip(results.iter_mut()) {
-                match &mut world.mover {
-                    Mover::Articulated(mover) => stepped.push(Stepped {
-                        mover,
-                        states: &mut world.states,
-                        contacts: &mut world.contacts,
-                        result,
-                    }),
-                    Mover::Rapier(mover) => {
-                        *result = mover.step();
-                        if result.is_ok() {
-                            mover.read(&mut world.states, &mut world.contacts);
-                        }
-                    }
-                }
-            }
+            let pairs = worlds.iter_mut().zip(results.iter_mut());
+            let mut stepped: Vec<Stepped> =
+                pairs.filter_map(|(w, result)| w.prepare(result)).collect();
             Articulated::step(&mut stepped);
             for (world, result) in worlds.iter().zip(results) {
                 if !world.states.iter().all(is_near) {
                     *result = Err(Diverged);
                 }
+            }
+        }
+    }
+
+    /// What steps together with others; rapier's step is taken at once.
+    fn prepare<'a>(&'a mut self, result: &'a mut Result<(), Diverged>) -> Option<Stepped<'a>> {
+        match &mut self.mover {
+            Mover::Articulated(mover) => Some(Stepped {
+                mover,
+                states: &mut self.states,
+                contacts: &mut self.contacts,
+                result,
+            }),
+            Mover::Rapier(mover) => {
+                *result = mover.step();
+                if result.is_ok() {
+                    mover.read(&mut self.states, &mut self.contacts);
+                }
+                None
             }
         }
     }

@@ -219,15 +219,19 @@ impl Imitate {
     }
 
     /// Advances agents of one stage and one setting, each by its own of `actions`, `[agents, actions]`: each as if alone,
-    /// to the bit, in less time.
+    /// in less time.
+    ///
+    /// # Panics
+    /// If there aren't as many actions.
     pub fn step_together<'a>(
         agents: impl Iterator<Item = &'a mut Imitate>,
         actions: &[f32],
     ) -> Vec<Step> {
         let mut agents: Vec<&mut Imitate> = agents.collect();
-        let actions = actions.chunks_exact(actions.len() / agents.len().max(1));
-        for (agent, action) in agents.iter_mut().zip(actions) {
-            agent.act(action);
+        let size = agents.first().map_or(0, |agent| agent.action_size());
+        assert_eq!(actions.len(), agents.len() * size, "actions of all agents");
+        for (i, agent) in agents.iter_mut().enumerate() {
+            agent.act(&actions[i * size..(i + 1) * size]);
         }
         let mut results = vec![Ok(()); agents.len()];
         let mut worlds: Vec<&mut World> = agents.iter_mut().map(|a| &mut a.world).collect();

@@ -156,18 +156,25 @@ impl Bench {
         })
     }
 
+    /// Where number `i` of a group begins, seconds: each elsewhere, as in training.
+    fn start(&self, i: usize) -> f64 {
+        self.reference.duration() * i as f64 / self.plan.group as f64
+    }
+
     /// Integrations of joints and contacts, at `physics_hz`, of characters that fall to the ground; each thread steps as
     /// many at once as in training.
     fn physics(&self) -> Outcome<f64> {
         let settings = self.plan.task.physics;
-        let mut first = self.reference.blank();
-        self.reference.sample(0.0, &mut first);
         self.on_all_threads(|| {
-            let new = || World::new(&self.stage.character, settings);
-            let mut worlds: Vec<World> = (0..self.plan.group).map(|_| new()).collect();
+            let mut first = self.reference.blank();
+            let new = |_| World::new(&self.stage.character, settings);
+            let mut worlds: Vec<World> = (0..self.plan.group).map(new).collect();
             let mut results = vec![Ok(()); worlds.len()];
             self.count(|| {
-                worlds.iter_mut().for_each(|w| w.reset(&first.links));
+                for (i, world) in worlds.iter_mut().enumerate() {
+                    self.reference.sample(self.start(i), &mut first);
+                    world.reset(&first.links);
+                }
                 let mut all: Vec<&mut World> = worlds.iter_mut().collect();
                 for _ in 0..settings.control_hz as usize {
                     World::step_together(&mut all, &mut results);
@@ -185,11 +192,14 @@ impl Bench {
             let mut envs: Vec<Imitate> = (0..self.plan.group).map(|_| new()).collect();
             let actions = vec![0.0; envs.len() * envs[0].action_size()];
             let mut observation = vec![0.0; envs[0].observation_size()];
+            for (i, env) in envs.iter_mut().enumerate() {
+                env.reset(self.start(i));
+            }
             self.count(|| {
                 let steps = Imitate::step_together(envs.iter_mut(), &actions);
-                for (env, step) in envs.iter_mut().zip(&steps) {
+                for (i, (env, step)) in envs.iter_mut().zip(&steps).enumerate() {
                     if step.outcome != mimic::task::Outcome::Running {
-                        env.reset(0.0);
+                        env.reset(self.start(i));
                     }
                     env.observe(&mut observation);
                 }

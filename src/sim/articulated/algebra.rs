@@ -2,6 +2,7 @@
 
 use super::lanes::Lanes;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 #[derive(Clone, Copy, Debug)]
@@ -298,23 +299,29 @@ impl<L: Lanes> Turn<L> {
     /// Turn by the rotation vector `v`, not farther than a full one.
     #[inline(always)]
     pub fn by(v: &Vec3<L>) -> Self {
-        let square = v.dot(v) * L::splat(0.25);
-        let (cos, ratio) = small_cos_sin(square);
+        // Of a quarter of the angle, which doubling it twice makes the half angle of a quaternion and then the angle.
+        let (square, full) = (
+            v.dot(v) * L::splat(1.0 / 16.0),
+            L::splat(FRAC_PI_2 * FRAC_PI_2),
+        );
+        let (within, square) = (square.below(full), square.min(full));
+        let (cos, ratio) = cos_sin(square);
+        let share = ratio * cos * L::splat(0.5);
         Turn {
-            w: cos,
-            v: *v * (ratio * L::splat(0.5)),
+            w: L::splat(1.0) - L::splat(2.0) * ratio * ratio * square,
+            v: *v * within.choose(share, L::ZERO),
         }
     }
 
     /// Turn by `angle` about a unit axis.
     #[inline(always)]
     pub fn about(axis: &Vec3<L>, angle: L) -> Self {
-        // Half of the half angle, less whole turns of it, is at most π/2.
+        // A quarter of the angle, less whole half turns of it.
         let quarter = angle * L::splat(0.25);
-        let turns =
-            (quarter * L::splat(std::f32::consts::FRAC_1_PI) + L::splat(ROUND)) - L::splat(ROUND);
-        let rest = quarter - turns * L::splat(std::f32::consts::PI);
-        let (cos, ratio) = small_cos_sin(rest * rest);
+        let turns = (quarter * L::splat(FRAC_1_PI) + L::splat(ROUND)) - L::splat(ROUND);
+        let rest = quarter - turns * L::splat(PI);
+        let rest = rest.min(L::splat(FRAC_PI_2)).max(L::splat(-FRAC_PI_2));
+        let (cos, ratio) = cos_sin(rest * rest);
         let sin = ratio * rest;
         let double = sin + sin;
         Turn {
@@ -333,7 +340,7 @@ impl<L: Lanes> Turn<L> {
         let large = L::splat(TAN_PI_8).below(tangent);
         let reduced = large.choose((tangent - one) / (tangent + one), tangent);
         let ratio = arctangent_ratio(reduced * reduced);
-        let angle = ratio * reduced + L::splat(std::f32::consts::FRAC_PI_4);
+        let angle = ratio * reduced + L::splat(FRAC_PI_4);
         // Of a small one |v| isn't divided by.
         let share = large.choose(angle / length, ratio / base) * L::splat(4.0);
         let sign = self.w.below(L::ZERO).choose(-one, one);
@@ -345,11 +352,10 @@ impl<L: Lanes> Turn<L> {
 const ROUND: f32 = 12_582_912.0;
 const TAN_PI_8: f32 = 0.414_213_57;
 
-/// cos x and sin x / x of x² up to (π/2)², by their Taylor series; beyond it those of π/2.
+/// cos x and sin x / x of x² up to (π/2)², by their Taylor series.
 #[inline(always)]
-fn small_cos_sin<L: Lanes>(square: L) -> (L, L) {
-    let x = square.min(L::splat(std::f32::consts::PI * std::f32::consts::PI / 4.0));
-    (alternating(x, 12.0), alternating(x, 13.0))
+fn cos_sin<L: Lanes>(square: L) -> (L, L) {
+    (alternating(square, 12.0), alternating(square, 13.0))
 }
 
 /// 1 − x/(m (m − 1)) + … with m the smallest of n, n − 2, … above 1, up to the term that n ends.

@@ -13,7 +13,7 @@ use super::solve::{Point, Solver, Twist};
 use super::spatial::{Force, Motion};
 use super::state::State;
 use super::tree::{Node, Tree};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use wide::f32x4;
 
 /// Contacts of one step.
@@ -22,16 +22,22 @@ pub(super) struct Contacts<L> {
     /// By lane.
     solvers: Vec<Solver>,
     friction: [f32; LANES],
-    /// Nodes that any lane has near the ground.
-    bodies: Vec<usize>,
-    /// `[bodies, width]`: halved Jacobians of their twists, along their paths.
+    near: Vec<Near>,
+    /// `[near, width]`: halved Jacobians of their twists, along their paths.
     halves: Vec<[L; 6]>,
     width: usize,
-    /// `[bodies]`: twists without contacts, then the ground's wrenches.
+    /// `[near]`: twists without contacts, then the ground's wrenches.
     twists: Vec<[L; 6]>,
     wrenches: Vec<[L; 6]>,
-    /// `[bodies, bodies]`: twist of the first for each part of the wrench on the second.
+    /// Of every pair, the second no later than the first: twist of the first for each part of the wrench on the second.
     coupling: Vec<[[L; 6]; 6]>,
+}
+
+/// A node near the ground, and the lanes in which it is.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    node: usize,
+    lanes: u32,
 }
 
 impl<L: Lanes> Contacts<L> {
@@ -39,7 +45,7 @@ impl<L: Lanes> Contacts<L> {
         Contacts {
             solvers: vec![Solver::default(); LANES],
             friction: [1.0; LANES],
-            bodies: Vec::new(),
+            near: Vec::new(),
             halves: Vec::new(),
             width: tree.nodes.iter().map(|n| n.path.len()).max().unwrap_or(0),
             twists: Vec::new(),
@@ -67,7 +73,7 @@ impl<L: Lanes> Contacts<L> {
         motions: &[Motion<L>],
         (ground, lanes): (&Ground, usize),
     ) {
-        self.bodies.clear();
+        self.near.clear();
         self.solvers.iter_mut().for_each(Solver::clear);
         let (mut id, used) = (0, (1 << lanes) - 1);
         for (i, node) in tree.nodes.iter().enumerate() {
@@ -94,60 +100,38 @@ impl<L: Lanes> Contacts<L> {
     ) {
         let (node, place) = (&tree.nodes[i], &pose.places[i]);
         let (dt, near) = (L::splat(ground.dt), L::splat(NEAR));
-        let mut touched = false;
+        let (mut lanes, next) = (0, self.near.len());
         for (n, (point, radius)) in node.points.iter().enumerate() {
             let mut arm = place.matrix.times(&Vec3::splat(point));
             arm.z -= L::splat(*radius);
             let gap = arm.z + place.origin.z + pose.origin.z;
             let velocity = motion.at(&(place.origin + arm));
             let mut close = gap.min(gap + dt * velocity.z).below(near).bits() & used;
-            touched |= close != 0;
+            lanes |= close;
             while close != 0 {
                 let lane = close.trailing_zeros() as usize;
                 close &= close - 1;
-                let (wanted, softness) = ground.wants(gap.of(lane), velocity.of(lane));
-                self.add(
-                    lane,
-                    first + n,
-                    Point {
-                        body: 0,
-                        arm: arm.of(lane),
-                        wanted,
-                        softness,
-                        friction: self.friction[lane] * node.friction,
-                        impulse: Vector3::zeros(),
-                        response: Matrix3::zeros(),
-                        id: first + n,
-                    },
-                );
+                let wants = ground.wants(gap.of(lane), velocity.of(lane));
+                let friction = self.friction[lane] * node.friction;
+                let point = Point::new(first + n, arm.of(lane), wants, friction);
+                self.solvers[lane].add((i, next), point);
             }
         }
-        if touched {
-            self.bodies.push(i);
+        if lanes != 0 {
+            self.near.push(Near { node: i, lanes });
         }
-    }
-
-    /// Of the body that comes next in `bodies`.
-    fn add(&mut self, lane: usize, id: usize, mut point: Point) {
-        let (solver, body) = (&mut self.solvers[lane], self.bodies.len());
-        if solver.bodies.last().is_none_or(|last| last.body != body) {
-            solver.add_body(body);
-        }
-        point.body = solver.bodies.len() - 1;
-        point.impulse = solver.last[id];
-        solver.points.push(point);
     }
 
     /// Adds to the half solution what keeps the characters in `open` out of the ground.
     #[inline(always)]
     pub fn resolve(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &mut Dynamics<L>, open: u32) {
-        if self.bodies.is_empty() {
+        if self.near.iter().all(|near| near.lanes & open == 0) {
             return;
         }
         self.halve(tree, pose, dynamics);
-        self.couple(tree);
+        self.couple(tree, open);
         self.wrenches.clear();
-        self.wrenches.resize(self.bodies.len(), [L::ZERO; 6]);
+        self.wrenches.resize(self.near.len(), [L::ZERO; 6]);
         for lane in (0..LANES).filter(|lane| open >> lane & 1 == 1) {
             self.solve(lane);
         }
@@ -157,21 +141,21 @@ impl<L: Lanes> Contacts<L> {
     /// Halves the Jacobians of the bodies, and takes their twists from what the step does without contacts.
     #[inline(always)]
     fn halve(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &Dynamics<L>) {
-        self.halves.clear();
+        // What is beyond a path is never read.
         self.halves
-            .resize(self.bodies.len() * self.width, [L::ZERO; 6]);
+            .resize(self.near.len() * self.width, [L::ZERO; 6]);
         self.twists.clear();
         let halves = self.halves.chunks_exact_mut(self.width);
-        for (&body, half) in self.bodies.iter().zip(halves) {
-            let path = &tree.nodes[body].path;
-            let origin = &pose.places[body].origin;
+        for (near, half) in self.near.iter().zip(halves) {
+            let path = &tree.nodes[near.node].path;
+            let origin = &pose.places[near.node].origin;
             for (half, &k) in half.iter_mut().zip(path) {
                 *half = rows(&pose.axes[k], origin);
             }
             dynamics
                 .factor
                 .halve_rows(tree, path, &mut half[..path.len()]);
-            let mut twist = rows(&dynamics.motions[body], origin);
+            let mut twist = rows(&dynamics.motions[near.node], origin);
             for (half, &k) in half.iter().zip(path) {
                 let change = dynamics.change[k];
                 for i in 0..6 {
@@ -182,55 +166,63 @@ impl<L: Lanes> Contacts<L> {
         }
     }
 
+    /// Of the pairs that a lane in `open` has on the ground together.
     #[inline(always)]
-    fn couple(&mut self, tree: &Tree) {
-        let count = self.bodies.len();
-        self.coupling.clear();
-        self.coupling.resize(count * count, [[L::ZERO; 6]; 6]);
-        for a in 0..count {
+    fn couple(&mut self, tree: &Tree, open: u32) {
+        let pairs = pair(self.near.len(), 0);
+        if self.coupling.len() < pairs {
+            self.coupling.resize(pairs, [[L::ZERO; 6]; 6]);
+        }
+        for a in 0..self.near.len() {
             for b in 0..=a {
-                let shared = tree.shared(self.bodies[a], self.bodies[b]);
+                let (x, y) = (self.near[a], self.near[b]);
+                if x.lanes & y.lanes & open == 0 {
+                    continue;
+                }
+                let shared = tree.shared(x.node, y.node);
                 let x = &self.halves[a * self.width..a * self.width + shared];
                 let y = &self.halves[b * self.width..b * self.width + shared];
-                let (mut there, mut back) = ([[L::ZERO; 6]; 6], [[L::ZERO; 6]; 6]);
-                for k in 0..6 {
-                    let mut sums = [L::ZERO; 6];
+                for (k, sums) in self.coupling[pair(a, b)].iter_mut().enumerate() {
+                    *sums = [L::ZERO; 6];
                     for (x, y) in x.iter().zip(y) {
                         for i in 0..6 {
                             sums[i] += x[i] * y[k];
                         }
                     }
-                    there[k] = sums;
-                    for i in 0..6 {
-                        back[i][k] = sums[i];
-                    }
                 }
-                self.coupling[b * count + a] = back;
-                self.coupling[a * count + b] = there;
             }
         }
     }
 
     /// One character's impulses, added up by body.
+    #[inline(always)]
     fn solve(&mut self, lane: usize) {
-        let (solver, count) = (&mut self.solvers[lane], self.bodies.len());
+        let solver = &mut self.solvers[lane];
         if solver.points.is_empty() {
             return;
         }
         solver.coupling.clear();
         for a in 0..solver.bodies.len() {
-            solver.bodies[a].twist = twist(&self.twists[solver.bodies[a].body], lane);
+            let near = solver.bodies[a].near;
+            solver.bodies[a].twist = twist(&self.twists[near], lane);
             solver.bodies[a].wrench = [0.0; 6];
             for b in 0..solver.bodies.len() {
-                let pair = solver.bodies[a].body * count + solver.bodies[b].body;
-                let columns = &self.coupling[pair];
-                let columns = std::array::from_fn(|k| twist(&columns[k], lane));
+                let other = solver.bodies[b].near;
+                let answers = &self.coupling[pair(near.max(other), near.min(other))];
+                let mut columns = [Twist::default(); 6];
+                for (k, column) in columns.iter_mut().enumerate() {
+                    *column = if near >= other {
+                        twist(&answers[k], lane)
+                    } else {
+                        twist(&std::array::from_fn(|i| answers[i][k]), lane)
+                    };
+                }
                 solver.coupling.push(columns);
             }
         }
         solver.solve();
         for pressed in &solver.bodies {
-            let parts = self.wrenches[pressed.body].iter_mut();
+            let parts = self.wrenches[pressed.near].iter_mut();
             for (part, x) in parts.zip(&pressed.wrench) {
                 part.set(lane, *x);
             }
@@ -240,8 +232,8 @@ impl<L: Lanes> Contacts<L> {
     #[inline(always)]
     fn apply(&self, tree: &Tree, change: &mut [L]) {
         let halves = self.halves.chunks_exact(self.width);
-        for ((&body, wrench), half) in self.bodies.iter().zip(&self.wrenches).zip(halves) {
-            for (half, &k) in half.iter().zip(&tree.nodes[body].path) {
+        for ((near, wrench), half) in self.near.iter().zip(&self.wrenches).zip(halves) {
+            for (half, &k) in half.iter().zip(&tree.nodes[near.node].path) {
                 for i in 0..6 {
                     change[k] += half[i] * wrench[i];
                 }
@@ -255,7 +247,7 @@ impl<L: Lanes> Contacts<L> {
         for (lane, solver) in self.solvers.iter().enumerate() {
             let [mut moment, mut force] = [Vector3::zeros(); 2];
             for point in &solver.points {
-                let node = self.bodies[solver.bodies[point.body].body];
+                let node = solver.bodies[point.body].node;
                 let at = pose.places[node].origin.of(lane) + point.arm;
                 moment += at.cross(&point.impulse);
                 force += point.impulse;
@@ -270,7 +262,7 @@ impl<L: Lanes> Contacts<L> {
     pub fn mark(&self, lane: usize, pressed: &mut [bool]) {
         let solver = &self.solvers[lane];
         for point in &solver.points {
-            let node = self.bodies[solver.bodies[point.body].body];
+            let node = solver.bodies[point.body].node;
             pressed[node] |= point.impulse.z > 0.0;
         }
     }
@@ -291,6 +283,11 @@ fn reaches_ground<L: Lanes>(
     L::splat(NEAR).at_least(soon).bits()
 }
 
+/// Where a pair of bodies is kept, `b` no later than `a`.
+fn pair(a: usize, b: usize) -> usize {
+    a * (a + 1) / 2 + b
+}
+
 /// Of a motion: turning, and velocity at `origin`.
 #[inline(always)]
 fn rows<L: Lanes>(motion: &Motion<L>, origin: &Vec3<L>) -> [L; 6] {
@@ -300,7 +297,8 @@ fn rows<L: Lanes>(motion: &Motion<L>, origin: &Vec3<L>) -> [L; 6] {
     ]
 }
 
+#[inline(always)]
 fn twist<L: Lanes>(parts: &[L; 6], lane: usize) -> Twist {
-    let [a, b, c, x, y, z] = std::array::from_fn(|i| parts[i].of(lane));
+    let [a, b, c, x, y, z] = parts.each_ref().map(|part| part.of(lane));
     [f32x4::from([a, b, c, 0.0]), f32x4::from([x, y, z, 0.0])]
 }

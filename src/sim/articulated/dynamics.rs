@@ -6,7 +6,7 @@ use super::matrix::PathMatrix;
 use super::pose::Pose;
 use super::spatial::{Force, Inertia, Motion};
 use super::state::State;
-use super::tree::{Joint, Tree};
+use super::tree::{Gains, Joint, Tree};
 
 const GRAVITY: f32 = 9.81;
 /// Stiffness of a stop, as a share of inertia / dt².
@@ -188,8 +188,7 @@ impl<L: Lanes> Dynamics<L> {
             if c.gains.limit > 0.0 {
                 let over = torque.abs().at_least(L::splat(c.gains.limit));
                 saturated = over.choose(sign, L::ZERO);
-                let free = L::ZERO.at_least(self.held[k].abs());
-                fresh |= over.and(free).bits();
+                fresh |= over.and(self.held[k].is_zero()).bits();
             }
             let [change, signs] = &mut self.settled[k];
             *change = mask.choose(self.change[k], *change);
@@ -260,11 +259,7 @@ impl<L: Lanes> Dynamics<L> {
         for (i, node) in tree.nodes.iter().enumerate() {
             let k = node.first;
             match node.joint {
-                Joint::Free => {
-                    for k in k..k + node.dof {
-                        self.stiffening[k] = L::ZERO;
-                    }
-                }
+                Joint::Free => {}
                 Joint::Ball => {
                     let error = self.targets[i].inverse().times(&pose.turns[i]).vector();
                     self.pull(tree, pose, k, error.x, dt);
@@ -285,8 +280,8 @@ impl<L: Lanes> Dynamics<L> {
     /// One coordinate's drive.
     #[inline(always)]
     fn pull(&mut self, tree: &Tree, pose: &Pose<L>, k: usize, error: L, dt: L) {
-        let gains = &tree.coordinates[k].gains;
-        let [kp, kd, limit] = [gains.kp, gains.kd, gains.limit].map(L::splat);
+        let Gains { kp, kd, limit } = tree.coordinates[k].gains;
+        let (kp, kd, limit) = (L::splat(kp), L::splat(kd), L::splat(limit));
         let along = kd + dt * kp;
         let torque = -(kp * error) - along * pose.velocity[k];
         // Zero where it isn't saturated, so never beyond.
@@ -312,7 +307,7 @@ impl<L: Lanes> Dynamics<L> {
     ) {
         let rate = pose.velocity[k];
         let next = pose.angles[i] + dt * rate;
-        let [low, high] = range.map(L::splat);
+        let (low, high) = (L::splat(range[0]), L::splat(range[1]));
         let beyond = next - next.max(low).min(high);
         let hit = L::ZERO.below(beyond.abs());
         if hit.bits() == 0 {

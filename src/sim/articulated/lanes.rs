@@ -1,21 +1,26 @@
 //! Eight numbers at a time: the same one of each of eight characters.
 //!
-//! A step takes the same way through the tree whatever the character does, so eight of them go it together. Everything
-//! between here and [`on_widest`] is inlined, so that it is compiled for the instructions that [`on_widest`] found the
-//! processor to have. No operation is fused with another, so all kinds give the same bits.
+//! A step takes the same way through the tree whatever the character does, so eight of them go it together. All that
+//! computes with lanes is inlined into [`on_widest`], so that it is compiled for the instructions that the processor was
+//! found to have. No operation is fused with another, so all kinds give the same bits.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use wide::f32x8;
 
-/// How many characters move together, in little more time than one.
+/// How many characters move together: in the air in little more time than one takes, on the ground in two to three times
+/// it.
 pub const LANES: usize = 8;
 
 /// Eight numbers, or eight masks: all bits or none.
-pub(super) trait Lanes:
+///
+/// # Safety
+/// The type is eight packed f32, and its bits may be any.
+pub(super) unsafe trait Lanes:
     Copy
     + Debug
     + Send
+    + Sync
     + 'static
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -31,14 +36,22 @@ pub(super) trait Lanes:
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
-    /// Masks.
+    /// A mask.
     fn below(self, other: Self) -> Self;
+    /// A mask.
     fn at_least(self, other: Self) -> Self;
+    /// Of two masks.
     fn and(self, other: Self) -> Self;
     /// `yes` where this mask is set.
     fn choose(self, yes: Self, no: Self) -> Self;
     /// Of a mask: bit k is that of lane k.
     fn bits(self) -> u32;
+
+    /// A mask of the zeros, of either sign.
+    #[inline(always)]
+    fn is_zero(self) -> Self {
+        Self::ZERO.at_least(self.abs())
+    }
 
     #[inline(always)]
     fn of(&self, lane: usize) -> f32 {
@@ -53,7 +66,7 @@ pub(super) trait Lanes:
     #[inline(always)]
     fn all(&self) -> &[f32; LANES] {
         const { assert!(size_of::<Self>() == size_of::<[f32; LANES]>()) };
-        // SAFETY: both kinds are eight packed f32, aligned as one or better.
+        // SAFETY: the trait's promise; an f32 needs no more than its alignment.
         unsafe { &*std::ptr::from_ref(self).cast() }
     }
 
@@ -97,7 +110,8 @@ pub(super) fn on_widest(work: impl Work) {
     work.run::<f32x8>();
 }
 
-impl Lanes for f32x8 {
+// SAFETY: `repr(C)` of an AVX register or of two of four f32.
+unsafe impl Lanes for f32x8 {
     const ZERO: Self = f32x8::ZERO;
     #[inline(always)]
     fn splat(x: f32) -> Self {
@@ -151,7 +165,7 @@ mod avx {
     /// here stand on.
     #[derive(Clone, Copy, Debug)]
     #[repr(transparent)]
-    pub struct Avx(__m256);
+    pub(super) struct Avx(__m256);
 
     macro_rules! operator {
         ($trait:ident $method:ident, $assign:ident $assigned:ident, $intrinsic:ident) => {
@@ -188,7 +202,8 @@ mod avx {
         }
     }
 
-    impl Lanes for Avx {
+    // SAFETY: `repr(transparent)` of a register of eight f32.
+    unsafe impl Lanes for Avx {
         // SAFETY: all bits 0 are eight zeros.
         const ZERO: Self = Avx(unsafe { std::mem::zeroed() });
 

@@ -25,7 +25,7 @@ use super::{Character, Diverged, Settings};
 use nalgebra::Vector3;
 use state::State;
 use std::sync::Arc;
-use step::Workspaces;
+use step::Workspace;
 use tree::Tree;
 
 pub use lanes::LANES;
@@ -35,7 +35,7 @@ pub(super) struct Articulated {
     state: State,
     settings: Settings,
     /// Of those that step together the first has it.
-    workspaces: Workspaces,
+    workspace: Workspace,
 }
 
 /// One of the characters of a step, and where it leaves what came of it.
@@ -51,7 +51,7 @@ impl Articulated {
         let tree = Arc::new(Tree::new(character));
         Articulated {
             state: State::new(&tree),
-            workspaces: Workspaces::default(),
+            workspace: Workspace::default(),
             tree,
             settings,
         }
@@ -74,12 +74,25 @@ impl Articulated {
     }
 
     /// Advances up to [`LANES`] characters of one tree and one setting by a control step.
+    ///
+    /// # Panics
+    /// If they aren't of one setting, or their trees differ in size.
     pub fn step(stepped: &mut [Stepped]) {
-        let Some(first) = stepped.first_mut() else {
+        let Some((first, others)) = stepped.split_first_mut() else {
             return;
         };
-        let mut workspaces = std::mem::take(&mut first.mover.workspaces);
-        workspaces.step(stepped);
-        stepped[0].mover.workspaces = workspaces;
+        let of_a_kind = |other: &Stepped| first.mover.is_like(other.mover);
+        assert!(
+            others.iter().all(of_a_kind),
+            "characters of different kinds step together"
+        );
+        let mut workspace = std::mem::take(&mut first.mover.workspace);
+        workspace.step(stepped);
+        stepped[0].mover.workspace = workspace;
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        let size = |tree: &Tree| (tree.nodes.len(), tree.coordinates.len(), tree.points());
+        self.settings == other.settings && size(&self.tree) == size(&other.tree)
     }
 }

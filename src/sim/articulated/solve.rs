@@ -17,8 +17,9 @@ pub(super) type Twist = [f32x4; 2];
 /// A body with points near the ground.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pressed {
-    /// Which of the bodies that any of the eight characters has there.
-    pub body: usize,
+    pub node: usize,
+    /// Which of the nodes that any of the eight characters has near the ground.
+    pub near: usize,
     pub twist: Twist,
     /// Moment about its origin and force: sum of its points' impulses.
     pub wrench: [f32; 6],
@@ -59,14 +60,24 @@ impl Solver {
         self.points.clear();
     }
 
-    pub fn add_body(&mut self, body: usize) {
-        self.bodies.push(Pressed {
-            body,
-            twist: [f32x4::ZERO; 2],
-            wrench: [0.0; 6],
+    /// Adds a point of `node`, which is number `near` of those near the ground.
+    pub fn add(&mut self, (node, near): (usize, usize), point: Point) {
+        if self.bodies.last().is_none_or(|last| last.near != near) {
+            self.bodies.push(Pressed {
+                node,
+                near,
+                twist: [f32x4::ZERO; 2],
+                wrench: [0.0; 6],
+            });
+        }
+        self.points.push(Point {
+            body: self.bodies.len() - 1,
+            impulse: self.last[point.id],
+            ..point
         });
     }
 
+    #[inline(always)]
     pub fn solve(&mut self) {
         self.respond();
         for _ in 0..SWEEPS {
@@ -81,6 +92,7 @@ impl Solver {
     }
 
     /// What each point does for itself, and where the impulses of the last step lead.
+    #[inline(always)]
     fn respond(&mut self) {
         let count = self.bodies.len();
         for i in 0..self.points.len() {
@@ -101,6 +113,7 @@ impl Solver {
     }
 
     /// Gives every point the impulse that it should have. Gives the largest change of a velocity.
+    #[inline(always)]
     fn sweep(&mut self) -> f32 {
         let mut largest: f32 = 0.0;
         for i in 0..self.points.len() {
@@ -124,6 +137,7 @@ impl Solver {
     }
 
     /// Gives an impulse at a point of a body.
+    #[inline(always)]
     fn spread(&mut self, body: usize, arm: &Vector3<f32>, impulse: &Vector3<f32>) {
         let count = self.bodies.len();
         let wrench = wrench(arm, impulse);
@@ -139,7 +153,27 @@ impl Solver {
 }
 
 impl Point {
+    /// Number `id` of the tree, with the velocity and softness that the ground wants of it.
+    pub fn new(
+        id: usize,
+        arm: Vector3<f32>,
+        (wanted, softness): (Vector3<f32>, f32),
+        friction: f32,
+    ) -> Self {
+        Point {
+            body: 0,
+            arm,
+            wanted,
+            softness,
+            friction,
+            impulse: Vector3::zeros(),
+            response: Matrix3::zeros(),
+            id,
+        }
+    }
+
     /// Impulse that stops the point, as far as it may, given its velocity under the present one.
+    #[inline(always)]
     fn next(&self, velocity: Vector3<f32>) -> Vector3<f32> {
         let (now, response) = (self.impulse, &self.response);
         // Softness resists the whole impulse, not only its change.
@@ -157,6 +191,7 @@ impl Point {
     }
 }
 
+#[inline(always)]
 fn wrench(arm: &Vector3<f32>, impulse: &Vector3<f32>) -> [f32; 6] {
     let moment = arm.cross(impulse);
     [
@@ -165,6 +200,7 @@ fn wrench(arm: &Vector3<f32>, impulse: &Vector3<f32>) -> [f32; 6] {
 }
 
 /// Twist that a wrench makes.
+#[inline(always)]
 fn answer(coupling: &[Twist; 6], wrench: &[f32; 6]) -> Twist {
     let mut sum = [f32x4::ZERO; 2];
     for (column, part) in coupling.iter().zip(wrench) {
@@ -176,10 +212,12 @@ fn answer(coupling: &[Twist; 6], wrench: &[f32; 6]) -> Twist {
 }
 
 /// Velocity at a point of a body.
+#[inline(always)]
 fn at(twist: &Twist, arm: &Vector3<f32>) -> Vector3<f32> {
     three(twist[1]) + three(twist[0]).cross(arm)
 }
 
+#[inline(always)]
 fn three(v: f32x4) -> Vector3<f32> {
     let [x, y, z, _] = v.to_array();
     Vector3::new(x, y, z)

@@ -16,9 +16,9 @@ const MOST_PASSES: usize = 3;
 
 /// What a step works in, of the kind of lanes that this machine has.
 #[derive(Default)]
-pub(super) struct Workspaces(Option<Box<dyn Any + Send>>);
+pub(super) struct Workspace(Option<Box<dyn Any + Send + Sync>>);
 
-struct Workspace<L> {
+struct Room<L> {
     pose: Pose<L>,
     dynamics: Dynamics<L>,
     contacts: Contacts<L>,
@@ -27,14 +27,14 @@ struct Workspace<L> {
 }
 
 struct ControlStep<'a, 'b> {
-    workspaces: &'a mut Workspaces,
+    workspace: &'a mut Workspace,
     stepped: &'a mut [Stepped<'b>],
 }
 
-impl Workspaces {
+impl Workspace {
     pub fn step(&mut self, stepped: &mut [Stepped]) {
         on_widest(ControlStep {
-            workspaces: self,
+            workspace: self,
             stepped,
         });
     }
@@ -46,9 +46,9 @@ impl Workspaces {
         self.of::<L>(&tree).advance(&tree, &settings, stepped);
     }
 
-    fn of<L: Lanes>(&mut self, tree: &Tree) -> &mut Workspace<L> {
+    fn of<L: Lanes>(&mut self, tree: &Tree) -> &mut Room<L> {
         let made = self.0.get_or_insert_with(|| {
-            Box::new(Workspace::<L> {
+            Box::new(Room::<L> {
                 pose: Pose::new(tree),
                 dynamics: Dynamics::new(tree),
                 contacts: Contacts::new(tree),
@@ -63,11 +63,11 @@ impl Workspaces {
 impl Work for ControlStep<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        self.workspaces.step_on::<L>(self.stepped);
+        self.workspace.step_on::<L>(self.stepped);
     }
 }
 
-impl<L: Lanes> Workspace<L> {
+impl<L: Lanes> Room<L> {
     #[inline(always)]
     fn advance(&mut self, tree: &Tree, settings: &Settings, stepped: &mut [Stepped]) {
         self.take(stepped);
@@ -92,7 +92,7 @@ impl<L: Lanes> Workspace<L> {
     }
 
     fn take(&mut self, stepped: &mut [Stepped]) {
-        // Lanes that nobody is in do what the first does.
+        // Lanes that nobody is in start as the first does: they need numbers that stay finite.
         for lane in 0..LANES {
             let one = stepped.get(lane).unwrap_or(&stepped[0]);
             self.pose.take(lane, &one.mover.state);
@@ -125,7 +125,7 @@ impl<L: Lanes> Workspace<L> {
 
     #[inline(always)]
     fn substep(&mut self, tree: &Tree, ground: &Ground, lanes: usize) {
-        let Workspace {
+        let Room {
             pose,
             dynamics,
             contacts,
@@ -134,6 +134,7 @@ impl<L: Lanes> Workspace<L> {
         let mut outside = dynamics.load(tree, pose, pushes, ground.dt);
         pushes.clear();
         contacts.find(tree, pose, &dynamics.motions, (ground, lanes));
+        // Lanes that nobody is in settle for the first pass.
         let (used, mut open) = ((1 << lanes) - 1, (1 << LANES) - 1);
         for _ in 0..MOST_PASSES {
             dynamics.accelerate(tree, pose, ground.dt);

@@ -1,14 +1,16 @@
 use super::algebra::{Symmetric, Turn, Vec3};
 use super::lanes::{LANES, Lanes, Work, on_widest};
-use super::step::Workspaces;
+use super::step::Workspace;
 use super::*;
 use crate::skeleton::Skeleton;
 use nalgebra::{Matrix3, UnitQuaternion};
 use wide::f32x8;
 
-/// Rotations from none to a full turn and beyond, about axes that differ.
+/// Rotations from none to almost a full turn, about axes that differ.
 fn rotation_vectors() -> Vec<Vector3<f32>> {
-    let lengths = [0.0, 1e-30, 1e-12, 1e-4, 0.01, 0.3, 1.2, 1.6, 2.2, 3.0, 3.14];
+    let lengths = [
+        0.0, 1e-30, 1e-12, 1e-4, 0.01, 0.3, 1.2, 1.6, 2.2, 3.0, 3.14, 3.5, 4.7, 5.5, 6.2,
+    ];
     let axis = |i: usize| {
         let i = i as f32;
         Vector3::new(i.sin(), (2.3 * i).cos(), (1.7 * i + 0.4).sin()).normalize()
@@ -24,16 +26,37 @@ fn turns_by_rotation_vectors_are_those_of_nalgebra() {
         let turn = Turn::<f32x8>::by(&Vec3::splat(&v));
         let apart = expected.angle_to(&turn.of(5).cast());
         assert!(apart < 5e-7, "{apart} from the turn by {v:?}");
-        for turn in [
-            turn,
-            Turn {
-                w: -turn.w,
-                v: -turn.v,
-            },
-        ] {
-            let back = turn.vector().of(3);
-            assert!((back - v).norm() < 2e-6, "{v:?} became {back:?}");
+        let shorter = expected.scaled_axis();
+        let negative = Turn {
+            w: -turn.w,
+            v: -turn.v,
+        };
+        for back in [turn, negative].map(|turn| turn.vector().of(3)) {
+            let apart = (back.cast() - shorter).norm();
+            assert!(apart < 4e-6, "{back:?} is {apart} from {shorter:?}");
         }
+    }
+}
+
+#[test]
+fn half_a_turn_has_a_vector_of_length_pi() {
+    let turn = Turn::<f32x8> {
+        w: f32x8::ZERO,
+        v: Vec3::splat(&Vector3::y()),
+    };
+    let length = turn.vector().of(0).norm();
+    assert!((length - std::f32::consts::PI).abs() < 1e-6, "{length}");
+}
+
+#[test]
+fn a_rotation_vector_beyond_all_bounds_still_makes_a_unit_quaternion() {
+    for length in [7.0, 1e3, 1e12, 1e18] {
+        let turn = Turn::<f32x8>::by(&Vec3::splat(&(Vector3::x() * length)));
+        let norm = (turn.w * turn.w + turn.v.dot(&turn.v)).sqrt().of(0);
+        assert!((norm - 1.0).abs() < 1e-3, "{norm} at {length}");
+        let turn = Turn::about(&Vec3::splat(&Vector3::x()), f32x8::splat(length));
+        let norm = (turn.w * turn.w + turn.v.dot(&turn.v)).sqrt().of(0);
+        assert!((norm - 1.0).abs() < 1e-3, "{norm} at {length}");
     }
 }
 
@@ -78,6 +101,7 @@ fn a_symmetric_matrix_is_turned_and_solved_as_in_nalgebra() {
 struct Fall<'a>(&'a mut Vec<LinkState>);
 
 impl Work for Fall<'_> {
+    #[inline(always)]
     fn run<L: Lanes>(self) {
         let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
         let character = Character::new(&skeleton).expect("it can be simulated");
@@ -86,7 +110,7 @@ impl Work for Fall<'_> {
         let mut states = character.states(&skeleton, &rest, &vec![0.3; skeleton.nv]);
         mover.reset(&states);
         let mut contacts = vec![false; character.links.len()];
-        let (mut workspaces, mut result) = (Workspaces::default(), Ok(()));
+        let (mut workspace, mut result) = (Workspace::default(), Ok(()));
         for _ in 0..40 {
             let one = Stepped {
                 mover: &mut mover,
@@ -94,7 +118,7 @@ impl Work for Fall<'_> {
                 contacts: &mut contacts,
                 result: &mut result,
             };
-            workspaces.step_on::<L>(&mut [one]);
+            workspace.step_on::<L>(&mut [one]);
         }
         assert!(result.is_ok() && contacts.contains(&true), "it never fell");
         *self.0 = states;
