@@ -16,6 +16,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// Height of the lowest point from which on a body is in the air, and that it reaches in a flight, leg lengths.
 const CLEAR: f64 = 0.015;
 const HIGH: f64 = 0.03;
+/// Height up to which it still pushes, leg lengths; and how long before and after it is clear it is looked for, s.
+const PUSHES: f64 = 0.004;
+const LEAVES: f64 = 0.05;
 /// Shortest flight, s.
 const SHORTEST: f64 = 0.1;
 /// A flight falls at least half as fast as it should: slower ones are steps with feet that float, …
@@ -121,9 +124,8 @@ impl Air<'_> {
     /// All flights that begin in the frames.
     fn flights(&self, low: &[f64]) -> Vec<Flight> {
         let leg = self.model.skeleton.leg_length();
-        let touches = |f: usize| self.anchors[f].iter().any(|a| a.weight >= TOUCHES);
         let up: Vec<bool> = (0..low.len())
-            .map(|f| low[f] > CLEAR * leg && !touches(f))
+            .map(|f| low[f] > CLEAR * leg && !self.touches(f))
             .collect();
         let is_up = |index: i64| self.locate(index).map(|(_, f)| up[f]);
         let count = self.frames.len() as i64;
@@ -139,13 +141,32 @@ impl Air<'_> {
             let mut heights = (a + 1..*b).filter_map(|i| self.locate(i));
             (b - a) as f64 >= SHORTEST * self.fps && heights.any(|(_, f)| low[f] > HIGH * leg)
         };
-        let flights = known.filter(high);
-        flights
-            .map(|(a, b)| Flight {
-                span: (a, b),
-                room: [run(a, -1, false), run(b, 1, false)],
-            })
-            .collect()
+        let flights = known.filter(high).map(|(a, b)| {
+            let [before, after] = [run(a, -1, false), run(b, 1, false)];
+            let earlier = self.leaves(low, (a, -1), before / 2);
+            let later = self.leaves(low, (b, 1), after / 2);
+            Flight {
+                span: (a - earlier, b + later),
+                room: [before - earlier, after - later],
+            }
+        });
+        flights.collect()
+    }
+
+    /// Frames that a body takes, in direction `step`, from where it is clear of the ground to where it pushes on it: at
+    /// most `most`, which leaves a stance between two flights its midst.
+    fn leaves(&self, low: &[f64], (from, step): (i64, i64), most: i64) -> i64 {
+        let pushes = PUSHES * self.model.skeleton.leg_length();
+        let above = |i: &i64| {
+            let at = self.locate(from + step * i);
+            at.is_some_and(|(_, f)| low[f] > pushes && !self.touches(f))
+        };
+        let longest = (LEAVES * self.fps).round() as i64;
+        (0..longest.min(most)).take_while(above).count() as i64
+    }
+
+    fn touches(&self, f: usize) -> bool {
+        self.anchors[f].iter().any(|a| a.weight >= TOUCHES)
     }
 
     /// From the frame before the flight to the one after it: how far the centre of mass is from its parabola; `None` if

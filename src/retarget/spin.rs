@@ -15,6 +15,9 @@ use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 const PASSES: usize = 3;
 /// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
 const FARTHEST: f64 = 0.5;
+/// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
+/// about half of the body's inertia.
+const LEADS: f64 = 2.0;
 /// A flight that is turned further than this is told of, radians.
 const TOLD: f64 = 0.1;
 
@@ -61,13 +64,14 @@ pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Vec<Option<Tilt>> {
     tilts
 }
 
-/// A flight's turns, and before and after it those that lead to and from their speed.
+/// A flight's turns, and before and after it those that lead to and from their speed: the faster, as legs that stand have
+/// no part in them.
 fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(i64, Tilt)> {
     let last = turns.len() - 1;
     let tilt = |by, flies| Tilt { by, flies };
     let ends = air.ends(flight).into_iter().map(|(index, end, share)| {
         let next = [turns[1], turns[last - 1]][end].scaled_axis();
-        let by = UnitQuaternion::from_scaled_axis(next * share);
+        let by = UnitQuaternion::from_scaled_axis(next * (LEADS * share));
         (index, tilt(by, false))
     });
     let flying = turns.iter().enumerate().take(last).skip(1);
@@ -210,10 +214,12 @@ mod tests {
         let found = tilts(&air, &flights);
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
-            let Some(Tilt { by, .. }) = turned else {
+            let Some(Tilt { by, flies }) = turned else {
                 continue;
             };
-            turn(&skeleton, qpos, by);
+            // Half of the body leads with all of the turn.
+            let share = if *flies { 1.0 } else { 1.0 / LEADS };
+            turn(&skeleton, qpos, &by.powf(share));
         }
         let momenta = |frames: &[Vec<f64>]| -> Vec<Vector3<f64>> {
             let steps = frames.windows(2).map(|pair| step(&skeleton, pair, FPS));
