@@ -28,7 +28,8 @@ pub struct Plan {
     pub activation: Activation,
     /// Environments that act side by side.
     pub environments: usize,
-    /// Environments that share a network call.
+    /// Environments that share a network call and physics steps: a multiple of [`LANES`](crate::sim::LANES) leaves no lane
+    /// idle.
     pub group: usize,
     /// Control steps of each environment in an iteration.
     pub horizon: usize,
