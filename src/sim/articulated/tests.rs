@@ -9,7 +9,7 @@ use wide::f32x8;
 /// Rotations from none to almost a full turn, about axes that differ.
 fn rotation_vectors() -> Vec<Vector3<f32>> {
     let lengths = [
-        0.0, 1e-30, 1e-12, 1e-4, 0.01, 0.3, 1.2, 1.6, 2.2, 3.0, 3.14, 3.5, 4.7, 5.5, 6.2,
+        0.0, 1e-30, 1e-12, 1e-4, 0.01, 0.3, 1.2, 1.6, 2.2, 3.0, 3.13, 3.5, 4.7, 5.5, 6.2,
     ];
     let axis = |i: usize| {
         let i = i as f32;
