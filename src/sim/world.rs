@@ -119,8 +119,9 @@ impl World {
         assert_eq!(worlds.len(), results.len(), "one result for each world");
         for (worlds, results) in worlds.chunks_mut(LANES).zip(results.chunks_mut(LANES)) {
             let pairs = worlds.iter_mut().zip(results.iter_mut());
-            let mut stepped: Vec<Stepped> =
-                pairs.filter_map(|(w, result)| w.prepare(result)).collect();
+            let mut stepped: Vec<Stepped> = pairs
+                .filter_map(|(w, result)| w.begin_step(result))
+                .collect();
             Articulated::step(&mut stepped);
             for (world, result) in worlds.iter().zip(results) {
                 if !world.states.iter().all(is_near) {
@@ -130,8 +131,8 @@ impl World {
         }
     }
 
-    /// What steps together with others; rapier's step is taken at once.
-    fn prepare<'a>(&'a mut self, result: &'a mut Result<(), Diverged>) -> Option<Stepped<'a>> {
+    /// What is to step together with others. Rapier has nothing to share between worlds, so its step is taken here.
+    fn begin_step<'a>(&'a mut self, result: &'a mut Result<(), Diverged>) -> Option<Stepped<'a>> {
         match &mut self.mover {
             Mover::Articulated(mover) => Some(Stepped {
                 mover,

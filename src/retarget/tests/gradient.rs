@@ -81,14 +81,7 @@ fn the_gradient_is_the_derivative_of_the_cost() {
     for skeleton in &skeletons {
         let (goals, anchors, frames) = rough(skeleton, 6);
         let model = Model::new(skeleton);
-        let problem = Problem {
-            model: &model,
-            goals: &goals,
-            anchors: &anchors,
-            fps: 30.0,
-            limit: cost::weight::LIMIT,
-            ground: cost::weight::GROUND,
-        };
+        let problem = Problem::new(&model, &goals, &anchors, 30.0);
         for (cycle, start, count) in [
             (None, 0, 6),
             (Some(&turning), 0, 6),

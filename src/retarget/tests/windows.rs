@@ -56,14 +56,7 @@ fn windows_give_what_one_solution_over_all_frames_gives() {
     let model = Model::new(&skeleton);
     let goals = swinging(&model);
     let anchors = vec![Vec::new(); FRAMES];
-    let problem = Problem {
-        model: &model,
-        goals: &goals,
-        anchors: &anchors,
-        fps: 30.0,
-        limit: cost::weight::LIMIT,
-        ground: cost::weight::GROUND,
-    };
+    let problem = Problem::new(&model, &goals, &anchors, 30.0);
     let ahead = Cycle {
         translation: Vector3::x() * TRAVEL * FRAMES as f64,
         heading: 0.0,

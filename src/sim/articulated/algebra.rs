@@ -1,7 +1,7 @@
 //! Vectors, matrices and rotations of eight characters.
 
 use super::lanes::Lanes;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
@@ -133,6 +133,19 @@ impl<L: Lanes> Symmetric<L> {
         xz: L::ZERO,
         yz: L::ZERO,
     };
+
+    /// The same matrix in every lane; its upper triangle is read.
+    #[inline(always)]
+    pub fn splat(m: &Matrix3<f32>) -> Self {
+        Symmetric {
+            xx: L::splat(m.m11),
+            yy: L::splat(m.m22),
+            zz: L::splat(m.m33),
+            xy: L::splat(m.m12),
+            xz: L::splat(m.m13),
+            yz: L::splat(m.m23),
+        }
+    }
 
     #[inline(always)]
     pub fn times(&self, v: &Vec3<L>) -> Vec3<L> {

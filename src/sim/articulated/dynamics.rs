@@ -99,7 +99,7 @@ impl<L: Lanes> Dynamics<L> {
         for (i, node) in tree.nodes.iter().enumerate() {
             let own = pose.own_motion(i, node);
             let place = &pose.places[i];
-            let central = symmetric(&node.inertia)
+            let central = Symmetric::splat(&node.inertia)
                 .turned(&place.matrix)
                 .scaled(self.mass);
             let com = place.point(&Vec3::splat(&node.com));
@@ -321,17 +321,5 @@ impl<L: Lanes> Dynamics<L> {
         );
         self.change[k] -= hit.choose(push, L::ZERO);
         self.stiffening[k] += hit.choose(stiff, L::ZERO);
-    }
-}
-
-#[inline(always)]
-fn symmetric<L: Lanes>(m: &nalgebra::Matrix3<f32>) -> Symmetric<L> {
-    Symmetric {
-        xx: L::splat(m.m11),
-        yy: L::splat(m.m22),
-        zz: L::splat(m.m33),
-        xy: L::splat(m.m12),
-        xz: L::splat(m.m13),
-        yz: L::splat(m.m23),
     }
 }

@@ -79,14 +79,7 @@ fn turns_about_an_axis_are_those_of_nalgebra_at_any_angle() {
 #[test]
 fn a_symmetric_matrix_is_turned_and_solved_as_in_nalgebra() {
     let m = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.5, 0.2, -0.1, 0.2, 0.7);
-    let lanes = Symmetric::<f32x8> {
-        xx: f32x8::splat(m.m11),
-        yy: f32x8::splat(m.m22),
-        zz: f32x8::splat(m.m33),
-        xy: f32x8::splat(m.m12),
-        xz: f32x8::splat(m.m13),
-        yz: f32x8::splat(m.m23),
-    };
+    let lanes = Symmetric::<f32x8>::splat(&m);
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.0, 0.7));
     let r = turn.to_rotation_matrix().into_inner();
     let v = Vector3::new(0.5, -1.0, 2.0);
