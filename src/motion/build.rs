@@ -52,6 +52,7 @@ impl Motion {
         );
         let support = Support {
             skeleton,
+            leg: skeleton.leg_length(),
             bodies: &bodies,
             com: &whole.com,
             required: &required,

@@ -171,7 +171,13 @@ impl Motion {
         let speeds = self.sole_speeds(skeleton);
         let weight = skeleton.total_mass() * wrench::GRAVITY;
         let missing: Vec<f64> = self.tracks.unsupported_force().collect();
-        let flights = frames().filter(|f| self.is_flight(skeleton, *f));
+        let clear = OFF_GROUND * skeleton.leg_length();
+        let high = |f: usize| {
+            let stands = self.tracks.contact[f].contains(&true);
+            !stands && skeleton.lowest_point(&self.bodies[f]) > clear
+        };
+        let high: Vec<bool> = frames().map(high).collect();
+        let flights = frames().filter(|f| self.is_flight(&high, *f));
         let checks = [
             reported(&KEY_POINTS, "/keypoint_error_m/mean"),
             reported(&AGREEMENT, "/contact_disagreement"),
@@ -225,19 +231,14 @@ impl Motion {
         })
     }
 
-    /// Whether nothing is near the ground around frame `f`.
-    fn is_flight(&self, skeleton: &Skeleton, f: usize) -> bool {
-        let high = |at: usize| {
-            let clear =
-                skeleton.lowest_point(&self.bodies[at]) > OFF_GROUND * skeleton.leg_length();
-            clear && !self.tracks.contact[at].contains(&true)
-        };
+    /// Whether nothing is near the ground around frame `f`, told in which frames nothing is.
+    fn is_flight(&self, high: &[bool], f: usize) -> bool {
         let timeline = self.timeline();
         let near = timeline.window(f, wrench::reach(self.fps));
         !self.contact_bodies.is_empty()
             && near
                 .filter_map(|i| timeline.locate(i))
-                .all(|(_, at)| high(at))
+                .all(|(_, at)| high[at])
     }
 
     /// By frame: the acceleration of the body that stands out most from how it moves in the frames around.

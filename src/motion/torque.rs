@@ -46,6 +46,7 @@ impl Motion {
         let required = wrench::required(com, spin, mass, self.fps, timeline);
         let support = Support {
             skeleton,
+            leg: skeleton.leg_length(),
             bodies: &self.bodies,
             com,
             required: &required,

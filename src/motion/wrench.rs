@@ -108,6 +108,8 @@ pub(crate) fn derivatives(
 /// A motion over the ground that has to carry it.
 pub(crate) struct Support<'a> {
     pub(crate) skeleton: &'a Skeleton,
+    /// [`Skeleton::leg_length`].
+    pub(crate) leg: f64,
     pub(crate) bodies: &'a [Vec<Isometry3<f64>>],
     pub(crate) com: &'a [Vector3<f64>],
     pub(crate) required: &'a [Wrench],
@@ -148,7 +150,7 @@ impl Support<'_> {
     /// Bodies count as standing if they do so within the window in which `required` was fitted, because its
     /// loads are those of the whole window.
     fn rays(&self, f: usize) -> Vec<Load> {
-        let leg = self.skeleton.leg_length();
+        let leg = self.leg;
         let near = |c: usize| {
             let window = self.timeline.window(f, reach(self.fps));
             let mut frames = window.filter_map(|i| self.timeline.locate(i));
@@ -180,7 +182,7 @@ impl Support<'_> {
     }
 
     fn length(&self) -> f64 {
-        self.skeleton.leg_length().max(1e-3)
+        self.leg.max(1e-3)
     }
 }
 
@@ -247,6 +249,7 @@ mod tests {
                 };
                 let support = Support {
                     skeleton: &skeleton,
+                    leg: skeleton.leg_length(),
                     bodies: std::slice::from_ref(&poses),
                     com: &[point],
                     required: &[required],

@@ -149,14 +149,15 @@ impl<'a> Fit<'a> {
         };
         let stiffer = cost::weight::STIFF_LIMITS.into_iter();
         for (limit, ground) in stiffer.zip(cost::weight::STIFF_GROUND) {
-            if frames.iter().any(|qpos| is_wrong(0, qpos)) {
-                let stiff = Problem {
-                    limit,
-                    ground,
-                    ..*problem
-                };
-                Solver::new(&stiff, self.cycle).mend(frames, is_wrong);
+            if !frames.iter().any(|qpos| is_wrong(0, qpos)) {
+                break;
             }
+            let stiff = Problem {
+                limit,
+                ground,
+                ..*problem
+            };
+            Solver::new(&stiff, self.cycle).mend(frames, is_wrong);
         }
         for qpos in frames {
             limits::clamp(skeleton, qpos);

@@ -1,6 +1,7 @@
 //! The whole trajectory in one least-squares problem: Levenberg–Marquardt over all frames at once, or, where these
 //! are many, over one window of them after the other.
 
+use super::banded::Factor;
 use super::cost::{Part, Problem, parts};
 use super::rotation::exp;
 use super::system::{Step, System, Window};
@@ -30,7 +31,7 @@ const ON_LOSS: f64 = 30.0;
 /// Rounds in which the seam of a cycle is brought into a step.
 const SEAM_ROUNDS: usize = 4;
 /// Memory for a window's equations, bytes: about 2,300 frames of a humanoid.
-const MEMORY: usize = 64 << 20;
+const MEMORY: usize = 106 << 20;
 /// Time by which a window reaches back into the one before, so that those frames see what comes after them, s.
 const OVERLAP: f64 = 1.0;
 /// Fewest frames in a window, whatever the skeleton.
@@ -64,7 +65,7 @@ impl<'a> Solver<'a> {
             parts: parts(problem.model),
             cycle: cycle.map(step),
             n,
-            longest: (MEMORY / (24 * n * n).max(1)).max(SHORTEST_WINDOW),
+            longest: (MEMORY / (40 * n * n).max(1)).max(SHORTEST_WINDOW),
         }
     }
 
@@ -139,7 +140,9 @@ impl<'a> Solver<'a> {
         window: Window,
         done: impl Fn(f64, f64) -> bool,
     ) -> Improved {
-        let mut system = System::new(self.n, window);
+        let new = || System::new(self.n, window);
+        let (mut system, mut trial) = (new(), new());
+        let mut factor = Factor::new(self.n, window.count);
         let mut cost = self.assemble(frames, &mut system);
         let mut damping = DAMPING;
         let mut improved = Improved {
@@ -149,12 +152,14 @@ impl<'a> Solver<'a> {
         while improved.steps < ITERATIONS {
             improved.steps += 1;
             let before: Vec<Vec<f64>> = window.frames().map(|f| frames[f].clone()).collect();
-            let moved = self.step(frames, &mut system, damping);
-            let trial = moved.map(|moved| (moved, self.assemble(frames, &mut system)));
-            if let Some((moved, trial_cost)) = trial.filter(|(_, trial)| *trial < cost) {
+            let step = system.solve(&mut factor, damping, SEAM_ROUNDS);
+            let moved = step.and_then(|step| self.step(frames, window, &step));
+            let tried = moved.map(|moved| (moved, self.assemble(frames, &mut trial)));
+            if let Some((moved, trial_cost)) = tried.filter(|(_, trial)| *trial < cost) {
                 let gain = (cost - trial_cost) / cost;
                 let most = moved.iter().copied().fold(0.0, f64::max);
                 cost = trial_cost;
+                std::mem::swap(&mut system, &mut trial);
                 damping *= ON_GAIN;
                 improved.moved = moved;
                 if done(gain, most) {
@@ -169,18 +174,14 @@ impl<'a> Solver<'a> {
                 break;
             }
             damping *= ON_LOSS;
-            self.assemble(frames, &mut system);
         }
         improved
     }
 
-    /// Moves the window's frames by a damped Gauss–Newton step, and tells how far each went; `None` if there is no
-    /// such step. Uses the system up.
-    fn step(&self, frames: &mut [Vec<f64>], system: &mut System, damping: f64) -> Option<Vec<f64>> {
-        system.damp(damping);
-        let x = system.solve(SEAM_ROUNDS)?;
-        let mut moved = Vec::with_capacity(system.window.count);
-        for (f, step) in system.window.frames().zip(x.chunks_exact(self.n)) {
+    /// Moves the window's frames by a step, and tells how far each went; `None` if it leads to no number.
+    fn step(&self, frames: &mut [Vec<f64>], window: Window, step: &[f64]) -> Option<Vec<f64>> {
+        let mut moved = Vec::with_capacity(window.count);
+        for (f, step) in window.frames().zip(step.chunks_exact(self.n)) {
             let most = step.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             if most > FARTHEST {
                 let shorter: Vec<f64> = step.iter().map(|x| x * FARTHEST / most).collect();
@@ -190,7 +191,7 @@ impl<'a> Solver<'a> {
             }
             moved.push(most);
         }
-        let mut coordinates = system.window.frames().flat_map(|f| &frames[f]);
+        let mut coordinates = window.frames().flat_map(|f| &frames[f]);
         coordinates.all(|v| v.is_finite()).then_some(moved)
     }
 

@@ -1,6 +1,6 @@
 //! The equations of a window of frames: what one Gauss–Newton step over all of them needs.
 
-use super::banded::Pentadiagonal;
+use super::banded::{Factor, Pentadiagonal};
 use super::cost::{Bend, Normal, Part, Problem, bend};
 use super::model::vector;
 use nalgebra::{Matrix3, Vector3};
@@ -97,44 +97,38 @@ impl System {
         cost + self.smoothness(problem, parts, cycle, frames)
     }
 
-    /// Adds to every frame's own equations the same stiffness, relative to the mean one.
-    pub fn damp(&mut self, damping: f64) {
-        let (n, size, count) = (self.n, self.n * self.n, self.window.count);
-        let places = (0..count).flat_map(|f| (0..n).map(move |i| f * size + i * n + i));
-        let total: f64 = places.clone().map(|at| self.band.diagonal[at]).sum();
-        let added = damping * total / (n * count) as f64;
-        places.for_each(|at| self.band.diagonal[at] += added);
-    }
-
-    /// The Gauss–Newton step; `None` where the equations are not positive definite. Uses the band up.
-    pub fn solve(&mut self, seam_rounds: usize) -> Option<Vec<f64>> {
-        if !self.band.factor() {
+    /// The Gauss–Newton step, where every coordinate is held by `damping` times the mean stiffness besides; `None` where
+    /// the equations are not positive definite.
+    pub fn solve(&self, factor: &mut Factor, damping: f64, seam_rounds: usize) -> Option<Vec<f64>> {
+        if !factor.set(&self.band, self.band.mean_times(damping)) {
             return None;
         }
         let mut x: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
-        self.band.solve(&mut x);
+        factor.solve(&mut x);
         if !self.corners.is_empty() {
-            self.close_seam(&mut x, seam_rounds);
+            self.close_seam(factor, &mut x, seam_rounds);
         }
         Some(x)
     }
 
     /// Brings the couplings across the seam into the solution `x` of the band M: with the couplings C, x ← M⁻¹(b − C x)
-    /// converges, because M − C is positive definite as M + C is.
-    fn close_seam(&self, x: &mut Vec<f64>, rounds: usize) {
+    /// converges, because M − C is positive definite as M + C is. Each change of x is −M⁻¹C times the one before it.
+    fn close_seam(&self, factor: &Factor, x: &mut [f64], rounds: usize) {
+        let mut change = x.to_vec();
         for _ in 0..rounds {
-            let mut right: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
+            let mut right = vec![0.0; x.len()];
             for corner in &self.corners {
                 for i in 0..corner.size {
                     for k in 0..corner.size {
                         let value = corner.block[(i, k)];
-                        right[corner.row + i] -= value * x[corner.column + k];
-                        right[corner.column + k] -= value * x[corner.row + i];
+                        right[corner.row + i] -= value * change[corner.column + k];
+                        right[corner.column + k] -= value * change[corner.row + i];
                     }
                 }
             }
-            self.band.solve(&mut right);
-            *x = right;
+            factor.solve_ends(&mut right);
+            x.iter_mut().zip(&right).for_each(|(x, by)| *x += by);
+            change = right;
         }
     }
 
@@ -193,23 +187,20 @@ impl System {
     /// Adds a block between two frames, `ahead` apart in time.
     fn couple(&mut self, part: &Part, (a, b, ahead): (usize, usize, usize), block: &Matrix3<f64>) {
         let (n, size) = (self.n, self.n * self.n);
-        let blocks = match ahead {
-            0 => &mut self.band.diagonal,
-            1 if b == a + 1 => &mut self.band.next,
-            2 if b == a + 2 => &mut self.band.second,
-            _ => {
-                self.corners.push(Corner {
-                    row: a * n + part.dof,
-                    column: b * n + part.dof,
-                    block: *block,
-                    size: part.size,
-                });
-                return;
-            }
-        };
-        for i in 0..part.size {
-            for k in 0..part.size {
-                blocks[a * size + (part.dof + i) * n + part.dof + k] += block[(i, k)];
+        if ahead > 0 && b != a + ahead {
+            self.corners.push(Corner {
+                row: a * n + part.dof,
+                column: b * n + part.dof,
+                block: *block,
+                size: part.size,
+            });
+            return;
+        }
+        for (i, k) in (0..part.size).flat_map(|i| (0..part.size).map(move |k| (i, k))) {
+            let (row, column) = (part.dof + i, part.dof + k);
+            match ahead {
+                0 => self.band.diagonal[a * size + row * n + column] += block[(i, k)],
+                _ => self.band.couple(a, ahead, (row, column), block[(i, k)]),
             }
         }
     }

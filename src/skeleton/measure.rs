@@ -105,13 +105,16 @@ impl Skeleton {
 
     /// Height of the lowest point of all shapes, metres; of body origins if there are no shapes.
     pub fn lowest_point(&self, poses: &[Isometry3<f64>]) -> f64 {
-        let all: Vec<usize> = (0..self.bodies.len()).collect();
-        self.lowest_point_of(poses, &all)
+        self.lowest(poses, 0..self.bodies.len())
     }
 
     /// The same over some bodies only. Infinite for no bodies at all.
     pub fn lowest_point_of(&self, poses: &[Isometry3<f64>], bodies: &[usize]) -> f64 {
-        let shapes = bodies.iter().flat_map(|&b| {
+        self.lowest(poses, bodies.iter().copied())
+    }
+
+    fn lowest(&self, poses: &[Isometry3<f64>], bodies: impl Iterator<Item = usize> + Clone) -> f64 {
+        let shapes = bodies.clone().flat_map(|b| {
             let pose = &poses[b];
             self.bodies[b].shapes.iter().map(|s| s.lowest(pose))
         });
@@ -119,7 +122,7 @@ impl Skeleton {
         if lowest.is_finite() {
             return lowest;
         }
-        let origins = bodies.iter().map(|&b| poses[b].translation.z);
+        let origins = bodies.map(|b| poses[b].translation.z);
         origins.fold(f64::INFINITY, f64::min)
     }
 
@@ -144,8 +147,16 @@ fn in_world(pose: &Isometry3<f64>, inertia: &Matrix3<f64>) -> Matrix3<f64> {
 impl Shape {
     /// Height of the shape's lowest point with its body at `pose`; exact.
     pub fn lowest(&self, pose: &Isometry3<f64>) -> f64 {
-        let points = self.ground_points(pose);
-        points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
+        let height = |p: &Vector3<f64>| (pose * Point3::from(*p)).z;
+        match self {
+            Shape::Sphere { center, radius } => height(center) - radius,
+            Shape::Capsule { a, b, radius } => height(a).min(height(b)) - radius,
+            Shape::Box { pose: own, half } => {
+                let turn = (pose.rotation * own.rotation).to_rotation_matrix();
+                let reach: f64 = (0..3).map(|i| turn[(2, i)].abs() * half[i]).sum();
+                height(&own.translation.vector) - reach
+            }
+        }
     }
 
     fn ground_points(&self, pose: &Isometry3<f64>) -> Vec<Vector3<f64>> {
