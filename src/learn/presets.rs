@@ -83,6 +83,8 @@ fn deepmimic() -> Plan {
             start_anywhere: true,
             adaptive_starts: 0.0,
             transitions_s: None,
+            // As in the authors' program.
+            cycles_follow: true,
             episode_s: 20.0,
         },
         // Section 6; noise and rates as in the authors' program, for they go together: a policy's gradient grows as its
@@ -152,6 +154,7 @@ fn booth2020() -> Plan {
             start_anywhere: false,
             adaptive_starts: 0.0,
             transitions_s: None,
+            cycles_follow: false,
             episode_s: 25.0,
         },
         ppo: Config {

@@ -1,18 +1,17 @@
 //! Phase-based imitation: one environment.
 
+use super::aim::aim;
 use super::observe::{Scene, observation_size, observe};
 use super::perturb::Disturbance;
 use super::reference::{Reference, Sample};
 use super::reward::{Terms, terms};
-use super::setting::{Actions, Setting};
+use super::setting::Setting;
 use super::stage::Stage;
 use super::terminate::{Failure, failure};
 use super::transition::Transition;
 use crate::clip::LoopMode;
-use crate::sim::{Diverged, HingeAxis, LinkJoint, LinkState, Target, World};
-use crate::skeleton::Drive;
+use crate::sim::{Diverged, LinkState, Target, World};
 use crate::task::Dynamics;
-use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// How an episode stands after a step.
@@ -242,7 +241,14 @@ impl Imitate {
 
     /// Aims the drives, and shoves when it is time for that.
     fn act(&mut self, action: &[f32]) {
-        self.aim(action);
+        aim(
+            self.setting.actions,
+            &self.stage.character,
+            &self.next.links,
+            action,
+            &mut self.targets,
+        );
+        self.world.set_targets(&self.targets);
         self.last_action.copy_from_slice(action);
         self.shove();
     }
@@ -271,6 +277,7 @@ impl Imitate {
         );
         let reward = terms.total(&self.setting.rewards);
         let outcome = self.outcome(reward);
+        self.follow();
         self.look_ahead();
         Step {
             reward,
@@ -324,6 +331,16 @@ impl Imitate {
         }
     }
 
+    /// Where a cycle begins, the reference is moved to the agent.
+    fn follow(&mut self) {
+        let dt = self.setting.physics.control_dt();
+        if self.setting.cycles_follow && self.reference.begins_cycle(self.time, dt) {
+            let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
+            let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
+            self.transition.shift(apart);
+        }
+    }
+
     fn look_ahead(&mut self) {
         let time = self.time + self.setting.physics.control_dt();
         let place = self.transition.at(time);
@@ -347,108 +364,7 @@ impl Imitate {
             None => Outcome::Running,
         }
     }
-
-    fn aim(&mut self, action: &[f32]) {
-        for (i, link) in self.stage.character.links.iter().enumerate() {
-            let Some(parent) = link.parent else { continue };
-            let part = &action[link.dof..link.dof + link.joint.dof()];
-            self.targets[i] = match self.setting.actions {
-                Actions::Residual { scale } => self.residual(i, parent, part, scale),
-                Actions::Absolute { reach } => absolute(&link.joint, part, |[low, high], a| {
-                    (low + high) / 2.0 + a * reach * (high - low) / 2.0
-                }),
-                Actions::FromRest { reach } => absolute(&link.joint, part, |[low, high], a| {
-                    a * reach * low.abs().max(high.abs())
-                }),
-            };
-        }
-        self.world.set_targets(&self.targets);
-    }
-
-    /// The reference's own rotation, turned on by the action.
-    ///
-    /// A drive kp (q* − q) − kd ω trails a moving reference by kd/kp · ω; so the target leads by as much, which is a
-    /// velocity feed-forward with position drives alone.
-    fn residual(&self, link: usize, parent: usize, action: &[f32], scale: f32) -> Target {
-        let (mine, other) = (&self.next.links[link], &self.next.links[parent]);
-        let turn =
-            self.stage
-                .character
-                .joint_rotation(link, other.pose.rotation, mine.pose.rotation);
-        let rate = mine
-            .pose
-            .rotation
-            .inverse_transform_vector(&(mine.angular - other.angular));
-        let joint = &self.stage.character.links[link].joint;
-        match joint {
-            LinkJoint::Free => Target::Free,
-            LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => {
-                let lead = Vector3::from_fn(|k, _| lag(&drives[k]) * rate[k]);
-                let added = turned(joint, action) * scale;
-                Target::Ball(turn * UnitQuaternion::from_scaled_axis(lead + added))
-            }
-            LinkJoint::Hinge { axis, drive } => {
-                let direction = axis.direction.cast::<f32>();
-                let lead = lag(drive) * rate.dot(&direction);
-                let angle = turn.scaled_axis().dot(&direction) + lead + action[0] * scale;
-                Target::Hinge(within_reach(axis, angle))
-            }
-        }
-    }
 }
 
 /// A body this little above the lowest one stands with it, metres.
 const STANDING: f64 = 0.01;
-
-/// How far beyond a hinge's range its drive may aim, radians: to press against the end of the range, or to hold a
-/// load near it. `skeletons/humanoid.xml` has the same in its control ranges.
-const BEYOND_LIMIT: f32 = 0.5;
-
-fn within_reach(axis: &HingeAxis, angle: f32) -> f32 {
-    let [low, high] = axis.limit.map(|end| end as f32);
-    angle.clamp(low - BEYOND_LIMIT, high + BEYOND_LIMIT)
-}
-
-/// Rotation vector in the link's frame that the action of a joint with several coordinates stands for.
-fn turned(joint: &LinkJoint, action: &[f32]) -> Vector3<f32> {
-    match joint {
-        LinkJoint::Hinges { hinges, .. } => hinges
-            .iter()
-            .zip(action)
-            .map(|(hinge, a)| hinge.direction.cast() * *a)
-            .sum(),
-        _ => Vector3::from_column_slice(action),
-    }
-}
-
-/// Seconds by which a drive trails a target that moves at constant speed.
-fn lag(drive: &Drive) -> f32 {
-    if drive.kp > 0.0 {
-        (drive.kd / drive.kp) as f32
-    } else {
-        0.0
-    }
-}
-
-/// Where `place` puts each coordinate, given its range and the action.
-fn absolute(joint: &LinkJoint, action: &[f32], place: impl Fn([f32; 2], f32) -> f32) -> Target {
-    let place = |limit: &[f64; 2], a: f32| place(limit.map(|end| end as f32), a);
-    match joint {
-        LinkJoint::Free => Target::Free,
-        LinkJoint::Hinge { axis, .. } => {
-            Target::Hinge(within_reach(axis, place(&axis.limit, action[0])))
-        }
-        LinkJoint::Ball { limits, .. } => {
-            let v = Vector3::from_fn(|k, _| place(&limits[k], action[k]));
-            Target::Ball(UnitQuaternion::from_scaled_axis(v))
-        }
-        LinkJoint::Hinges { hinges, .. } => {
-            let turn = |(hinge, a): (&HingeAxis, &f32)| {
-                let angle = within_reach(hinge, place(&hinge.limit, *a));
-                UnitQuaternion::from_scaled_axis(hinge.direction.cast() * angle)
-            };
-            let turns = hinges.iter().zip(action).map(turn);
-            Target::Ball(turns.fold(UnitQuaternion::identity(), |all, next| all * next))
-        }
-    }
-}

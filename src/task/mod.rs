@@ -3,6 +3,7 @@
 //! [`Imitate`] is the phase-based imitation of a reference motion. Every observation block, reward term and
 //! termination rule is a pure function that training, evaluation, plots and tests all call.
 
+mod aim;
 mod dynamics;
 mod imitate;
 mod observe;

@@ -108,6 +108,11 @@ impl Reference {
         self.loop_mode == LoopMode::Clamp && time >= self.duration - 1e-9
     }
 
+    /// Whether a cycle of a motion that repeats began within the `dt` seconds before `time`.
+    pub fn begins_cycle(&self, time: f64, dt: f64) -> bool {
+        self.split(time).0 > self.split(time - dt).0
+    }
+
     /// Largest angular momentum of all frames, kg·m²/s.
     pub fn largest_momentum(&self) -> f32 {
         let momentum = |links: &Vec<LinkState>| self.masses.dynamics(links).angular_momentum.norm();

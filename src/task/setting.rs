@@ -152,6 +152,9 @@ pub struct Setting {
     /// Seconds after which an episode goes over into another motion of the run, and after which into the next: least and
     /// most. `None` keeps it to one.
     pub transitions_s: Option<[f64; 2]>,
+    /// Whether every cycle of a motion that repeats begins where the agent's root is along the ground, so that nothing asks
+    /// it to catch up; else the motion goes its own way.
+    pub cycles_follow: bool,
     /// Longest episode in training, seconds.
     pub episode_s: f64,
 }
@@ -168,6 +171,7 @@ impl Default for Setting {
             start_anywhere: true,
             adaptive_starts: 0.25,
             transitions_s: None,
+            cycles_follow: false,
             episode_s: 10.0,
         }
     }

@@ -56,6 +56,12 @@ impl Transition {
         }
     }
 
+    /// The same motion, moved on along the ground.
+    pub fn shift(&mut self, by: Vector3<f32>) {
+        let along = Vector3::new(by.x, by.y, 0.0);
+        self.place = Translation3::from(along) * self.place;
+    }
+
     /// Where the motion is performed at `time` seconds of it. With τ the share of [`EASES`] that has passed it slides at
     /// Δv (1 − τ)², and has so far gone Δv E/3 (1 − (1 − τ)³).
     pub fn at(&self, time: f64) -> Placement {
