@@ -142,7 +142,15 @@ pub fn play_sequence(
     for (part, &number) in which.iter().enumerate() {
         let reference = &performer.references()[number];
         if part > 0 {
-            env.change_to(reference);
+            env.lead_to(reference);
+        }
+        while env.is_leading() {
+            trace.possible += 1;
+            let step = env.step(performer.act(&env, &mut memory)?);
+            trace.keep(performer, &env, &step);
+            if trace.failure.is_some() {
+                return Ok((trace, part));
+            }
         }
         trace.largest_momentum = trace.largest_momentum.max(reference.largest_momentum());
         let steps = episode_s(reference, seconds) * setting.physics.control_hz;

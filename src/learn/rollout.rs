@@ -80,8 +80,9 @@ pub(super) struct Episode {
 /// One environment, its random stream and its running episode.
 struct Player {
     env: Imitate,
-    /// Which reference it imitates.
+    /// Which reference it imitates, and which one it is led to.
     motion: usize,
+    upcoming: usize,
     number: u64,
     rng: ChaCha8Rng,
     episode: Episode,
@@ -115,6 +116,7 @@ impl Group {
             .map(|number| Player {
                 env: Imitate::new(stage.clone(), references[0].clone(), setting),
                 motion: 0,
+                upcoming: 0,
                 number: number as u64,
                 rng: ChaCha8Rng::seed_from_u64(0),
                 episode: Episode::default(),
@@ -259,13 +261,19 @@ impl Player {
         actor: &Actor,
         references: &[Arc<Reference>],
     ) -> Outcome {
+        if !self.env.is_leading() {
+            self.motion = self.upcoming;
+        }
         let due = outcome == Outcome::Running && self.env.elapsed() >= self.next_change;
         if transitions_s.is_none() || !(due || outcome == Outcome::Finished) {
             return outcome;
         }
-        self.motion = actor.starts.draw(&mut self.rng).motion;
+        self.upcoming = actor.starts.draw(&mut self.rng).motion;
         let elapsed = self.env.elapsed();
-        self.env.change_to(&references[self.motion]);
+        self.env.lead_to(&references[self.upcoming]);
+        if !self.env.is_leading() {
+            self.motion = self.upcoming;
+        }
         self.plan_change(transitions_s);
         self.next_change += elapsed;
         Outcome::Running
@@ -285,7 +293,7 @@ impl Player {
         transitions_s: Option<[f64; 2]>,
     ) {
         let Place { motion, time } = starts.draw(&mut self.rng);
-        self.motion = motion;
+        (self.motion, self.upcoming) = (motion, motion);
         self.env.imitate(&references[motion], time);
         if self.env.is_perturbed() {
             self.env.perturb(self.rng.next_u64());

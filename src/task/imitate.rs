@@ -41,6 +41,8 @@ pub struct Imitate {
     reference: Arc<Reference>,
     /// What leads into the reference.
     transition: Transition,
+    /// What the reference goes over into, and at which time.
+    upcoming: Option<(f64, Arc<Reference>)>,
     setting: Setting,
     world: World,
     time: f64,
@@ -67,6 +69,7 @@ impl Imitate {
             stage,
             reference,
             transition: Transition::none(),
+            upcoming: None,
             setting: *setting,
             time: 0.0,
             started: 0.0,
@@ -94,16 +97,58 @@ impl Imitate {
         self.reset(time);
     }
 
+    /// Goes over into another `reference`, as by [`Imitate::change_to`], at the control step of the next second at which
+    /// the present one comes nearest to it; at once where the present one ends.
+    pub fn lead_to(&mut self, reference: &Arc<Reference>) {
+        let dt = self.setting.physics.control_dt();
+        let end = match self.reference.loop_mode() {
+            LoopMode::Wrap => f64::INFINITY,
+            LoopMode::Clamp => self.reference.duration() - dt,
+        };
+        let steps = (WAITS / dt).round() as u32;
+        let mut sample = self.blank();
+        let mut best = (f32::INFINITY, self.time);
+        for step in 0..steps.max(1) {
+            let time = self.time + f64::from(step) * dt;
+            if step > 0 && time > end {
+                break;
+            }
+            self.wanted_at(time, &mut sample);
+            let distance = reference.distance(&sample);
+            if distance < best.0 {
+                best = (distance, time);
+            }
+        }
+        self.upcoming = Some((best.1, reference.clone()));
+        self.change_in_time();
+    }
+
+    /// Whether [`Imitate::lead_to`] hasn't led to its reference yet.
+    pub fn is_leading(&self) -> bool {
+        self.upcoming.is_some()
+    }
+
+    fn change_in_time(&mut self) {
+        if let Some((time, _)) = self.upcoming
+            && self.time >= time - 1e-9
+            && let Some((_, reference)) = self.upcoming.take()
+        {
+            self.change_to(&reference);
+        }
+    }
+
     /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
-    /// from where and whither the present one has brought the character, and within a second from its speed to the new
-    /// one's.
+    /// from where and whither the present one has brought the character, within 0.4 s from its pose to the new one's,
+    /// and within a second from its speed.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         let mut present = self.reference.blank();
         self.wanted(&mut present);
         let time = reference.nearest(&present);
         let mut begun = reference.blank();
         reference.sample(time, &mut begun);
-        self.transition = Transition::between(&present, &begun, time);
+        let character = &self.stage.character;
+        self.transition = Transition::between(character, &present, &begun, time);
+        self.upcoming = None;
         self.started += time - self.time;
         self.time = time;
         self.reference = reference.clone();
@@ -117,8 +162,16 @@ impl Imitate {
 
     /// Writes the reference at the present moment.
     pub fn wanted(&self, sample: &mut Sample) {
-        let place = self.transition.at(self.time);
-        self.reference.sample_at(&place, self.time, sample);
+        self.wanted_at(self.time, sample);
+    }
+
+    fn wanted_at(&self, time: f64, sample: &mut Sample) {
+        let place = self.transition.at(time);
+        self.reference.sample_at(&place, time, sample);
+        let character = &self.stage.character;
+        if self.transition.blend(character, time, &mut sample.links) {
+            sample.dynamics = self.reference.masses().dynamics(&sample.links);
+        }
     }
 
     /// Starts an episode in the reference's own state at `time` seconds.
@@ -126,6 +179,7 @@ impl Imitate {
         self.time = time;
         self.started = time;
         self.transition = Transition::none();
+        self.upcoming = None;
         self.reference.sample(time, &mut self.next);
         self.world.reset(&self.next.links);
         self.dynamics = self.reference.masses().dynamics(self.world.states());
@@ -278,6 +332,7 @@ impl Imitate {
         let reward = terms.total(&self.setting.rewards);
         let outcome = self.outcome(reward);
         self.follow();
+        self.change_in_time();
         self.look_ahead();
         Step {
             reward,
@@ -343,8 +398,11 @@ impl Imitate {
 
     fn look_ahead(&mut self) {
         let time = self.time + self.setting.physics.control_dt();
-        let place = self.transition.at(time);
-        self.reference.sample_at(&place, time, &mut self.next);
+        // Taken out for the moment, so that its room is used again.
+        let blank = Sample::default();
+        let mut next = std::mem::replace(&mut self.next, blank);
+        self.wanted_at(time, &mut next);
+        self.next = next;
     }
 
     fn outcome(&self, reward: f32) -> Outcome {
@@ -365,6 +423,9 @@ impl Imitate {
         }
     }
 }
+
+/// Seconds in which [`Imitate::lead_to`] goes over.
+const WAITS: f64 = 1.0;
 
 /// A body this little above the lowest one stands with it, metres.
 const STANDING: f64 = 0.01;

@@ -4,6 +4,7 @@
 //! termination rule is a pure function that training, evaluation, plots and tests all call.
 
 mod aim;
+mod blend;
 mod dynamics;
 mod imitate;
 mod observe;

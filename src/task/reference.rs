@@ -12,9 +12,11 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 /// Link states between the table's frames are blended link by link, which shortens a limb that turns at ω by
 /// 1 − cos(ω/2f): at 120 Hz and 12 rad/s by a half per mille, in a table of a clip's own 16 Hz by 7 %.
 const TABLE_HZ: f64 = 120.0;
+/// Frames a second that [`Reference::distance`] looks at.
+const LOOKED_AT_HZ: f64 = 30.0;
 
-/// The reference at one time.
-#[derive(Clone, Debug)]
+/// The reference at one time; by default there is nothing in it.
+#[derive(Clone, Debug, Default)]
 pub struct Sample {
     /// One per link.
     pub links: Vec<LinkState>,
@@ -42,6 +44,8 @@ pub struct Reference {
     start: Isometry3<f32>,
     contacts: Vec<Vec<bool>>,
     cycle: Cycle,
+    /// Of every frame, places and velocities of its links as [`upon_the_ground`] sees them.
+    grounded: Vec<Vec<[Vector3<f32>; 2]>>,
     masses: Masses,
     /// Links that the motion puts on the ground.
     pub contact_links: Vec<usize>,
@@ -74,6 +78,7 @@ impl Reference {
             loop_mode: motion.loop_mode,
             duration,
             start: anchor(&frames[0][0].pose),
+            grounded: frames.iter().map(|links| upon_the_ground(links)).collect(),
             frames,
             contacts: times().map(contact).collect(),
             cycle: motion.cycle,
@@ -167,21 +172,32 @@ impl Reference {
     /// all links of the squared distances, and of the squared differences of velocity times 0.1 s. One that ends is
     /// entered in its first half.
     pub fn nearest(&self, sample: &Sample) -> f64 {
+        self.entry(sample, 1).0
+    }
+
+    /// How near this motion comes to `sample`, as in [`Reference::nearest`].
+    pub fn distance(&self, sample: &Sample) -> f32 {
+        let step = (self.rate / LOOKED_AT_HZ).ceil().max(1.0);
+        self.entry(sample, step as usize).1
+    }
+
+    /// The best entry of every `step`th frame, seconds, and its distance.
+    fn entry(&self, sample: &Sample, step: usize) -> (f64, f32) {
         let wanted = upon_the_ground(&sample.links);
-        let distance = |links: &Vec<LinkState>| -> f32 {
-            let pairs = upon_the_ground(links).into_iter().zip(&wanted);
-            let apart = |(a, b): ([Vector3<f32>; 2], &[Vector3<f32>; 2])| {
+        let distance = |links: &Vec<[Vector3<f32>; 2]>| -> f32 {
+            let apart = |(a, b): (&[Vector3<f32>; 2], &[Vector3<f32>; 2])| {
                 (a[0] - b[0]).norm_squared() + 0.01 * (a[1] - b[1]).norm_squared()
             };
-            pairs.map(apart).sum()
+            links.iter().zip(&wanted).map(apart).sum()
         };
         let entries = match self.loop_mode {
             LoopMode::Wrap => self.frames.len(),
             LoopMode::Clamp => self.frames.len().div_ceil(2),
         };
-        let distances = self.frames[..entries].iter().map(distance).enumerate();
+        let frames = self.grounded[..entries].iter().enumerate().step_by(step);
+        let distances = frames.map(|(frame, links)| (frame as f64 / self.rate, distance(links)));
         let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
-        nearest.map_or(0.0, |(frame, _)| frame as f64 / self.rate)
+        nearest.unwrap_or((0.0, f32::INFINITY))
     }
 
     fn split(&self, time: f64) -> (i64, f64) {
@@ -244,7 +260,7 @@ fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {
     }
 }
 
-fn moved(state: &LinkState, offset: &Isometry3<f32>) -> LinkState {
+pub(super) fn moved(state: &LinkState, offset: &Isometry3<f32>) -> LinkState {
     LinkState {
         pose: offset * state.pose,
         linear: offset.rotation * state.linear,

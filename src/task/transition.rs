@@ -1,6 +1,8 @@
 //! How one motion goes over into another.
 
-use super::reference::{Sample, anchor};
+use super::blend::Blend;
+use super::reference::{Sample, anchor, moved};
+use crate::sim::{Character, LinkState};
 use nalgebra::{Isometry3, Translation3, Vector3};
 
 /// Seconds in which the speed of the one becomes that of the other.
@@ -16,6 +18,12 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// Puts a link of the motion there.
+    pub(super) fn put(&self, link: &mut LinkState) {
+        *link = moved(link, &self.pose);
+        link.linear += self.velocity;
+    }
+
     /// Where the motion itself has it.
     pub fn own() -> Self {
         Self {
@@ -25,14 +33,15 @@ impl Placement {
     }
 }
 
-/// What leads into a motion: its place, and what is left of the speed of the one before it.
-#[derive(Clone, Copy, Debug)]
+/// What leads into a motion: its place, and what is left of the speed and the pose of the one before it.
+#[derive(Clone, Debug)]
 pub(super) struct Transition {
     place: Isometry3<f32>,
     /// When it began, seconds of the motion.
     since: f64,
     /// How much faster the one before was, m/s, along the ground.
     surplus: Vector3<f32>,
+    blend: Option<Blend>,
 }
 
 impl Transition {
@@ -42,18 +51,36 @@ impl Transition {
             place: Isometry3::identity(),
             since: 0.0,
             surplus: Vector3::zeros(),
+            blend: None,
         }
     }
 
     /// From where `present` has brought the character into a motion that is at `begun` at `time` seconds.
-    pub fn between(present: &Sample, begun: &Sample, time: f64) -> Self {
+    pub fn between(character: &Character, present: &Sample, begun: &Sample, time: f64) -> Self {
         let place = anchor(&present.links[0].pose) * anchor(&begun.links[0].pose).inverse();
         let surplus = present.dynamics.com_velocity - place.rotation * begun.dynamics.com_velocity;
-        Self {
+        let mut transition = Self {
             place,
             since: time,
             surplus: Vector3::new(surplus.x, surplus.y, 0.0),
+            blend: None,
+        };
+        let begins = transition.at(time);
+        let mut links = begun.links.clone();
+        links.iter_mut().for_each(|link| begins.put(link));
+        transition.blend = Some(Blend::between(character, &present.links, &links));
+        transition
+    }
+
+    /// Adds to the links of the motion at `time` seconds, where it is performed, what is left of the pose before it; tells
+    /// whether anything is.
+    pub fn blend(&self, character: &Character, time: f64, links: &mut [LinkState]) -> bool {
+        let passed = time - self.since;
+        let blend = self.blend.as_ref().filter(|blend| blend.lasts(passed));
+        if let Some(blend) = blend {
+            blend.apply(character, passed, links);
         }
+        blend.is_some()
     }
 
     /// The same motion, moved on along the ground.

@@ -1,6 +1,7 @@
 //! How a motion goes over into another, and a cycle into the next.
 
 use super::*;
+use crate::task::blend::Blend;
 
 /// An agent that stands in the way of its walk stays behind by most of a cycle; the next cycle begins where it is.
 #[test]
@@ -79,6 +80,13 @@ fn another_motion_begins_where_the_one_before_has_led() {
         let pose = sample.links[0].pose;
         (pose.translation.vector.xy(), pose.rotation * Vector3::x())
     };
+    // In the same pose and at the same speed, to begin with.
+    for (a, b) in before.links.iter().zip(&after.links) {
+        assert!((a.pose.translation.vector - b.pose.translation.vector).norm() < 1e-4);
+        assert!(a.pose.rotation.angle_to(&b.pose.rotation) < 1e-3);
+        assert!((a.linear - b.linear).norm() < 1e-3);
+        assert!((a.angular - b.angular).norm() < 1e-2);
+    }
     let ((at, ahead), (then, facing)) = (root(&before), root(&after));
     assert!((at - then).norm() < 1e-4);
     assert!(ahead.xy().normalize().dot(&facing.xy().normalize()) > 1.0 - 1e-5);
@@ -105,4 +113,88 @@ fn another_motion_begins_where_the_one_before_has_led() {
         (speed(&after).norm() - speed(&alone).norm()).abs() < 1e-4,
         "{turn}"
     );
+}
+
+/// While a pose that stands still takes over from the midst of a kick, places and velocities belong together, limbs keep
+/// their length, and in the end the new pose is all there is.
+#[test]
+fn a_blend_moves_as_it_says() {
+    let stage = stage();
+    let present = sample(0.6);
+    let mut still = sample(0.0).links;
+    for link in &mut still {
+        (link.linear, link.angular) = (Vector3::zeros(), Vector3::zeros());
+    }
+    let blend = Blend::between(&stage.character, &present.links, &still);
+    let at = |seconds: f64| {
+        let mut links = still.clone();
+        blend.apply(&stage.character, seconds, &mut links);
+        links
+    };
+    let step = 0.002;
+    let mut fastest: f32 = 0.0;
+    for part in 1..20 {
+        let seconds = 0.02 * f64::from(part);
+        let (before, now, after) = (at(seconds - step), at(seconds), at(seconds + step));
+        for i in 0..now.len() {
+            let [a, b] = [&before[i].pose, &after[i].pose];
+            let span = 2.0 * step as f32;
+            let linear = (b.translation.vector - a.translation.vector) / span;
+            let angular = (b.rotation * a.rotation.inverse()).scaled_axis() / span;
+            assert!(
+                (linear - now[i].linear).norm() < 0.02,
+                "{i}: {linear} at {seconds}"
+            );
+            assert!(
+                (angular - now[i].angular).norm() < 0.05,
+                "{i}: {angular} at {seconds}"
+            );
+            fastest = fastest.max(angular.norm());
+            if let Some(p) = stage.character.links[i].parent {
+                let length = |links: &[LinkState]| {
+                    let [a, b] = [p, i].map(|i| links[i].pose.translation.vector);
+                    (a - b).norm()
+                };
+                let anchored = stage.character.links[i].anchor.norm() > 0.0;
+                assert!(anchored || (length(&now) - length(&still)).abs() < 1e-4);
+            }
+        }
+    }
+    assert!(fastest > 2.0, "the kick is fast: {fastest} rad/s");
+    assert!(!blend.lasts(0.4));
+    for (a, b) in at(0.4).iter().zip(&still) {
+        assert!((a.pose.translation.vector - b.pose.translation.vector).norm() < 1e-5);
+        assert!(a.linear.norm() < 1e-4 && a.angular.norm() < 1e-4);
+    }
+}
+
+/// Told to go over at any moment, it does so where the two motions are alike: never farther apart than at that moment.
+#[test]
+fn a_motion_is_left_where_the_next_one_is_near() {
+    let walk = motion("walk.glb", Some(LoopMode::Wrap));
+    let kick = motion("kick.fbx", Some(LoopMode::Clamp));
+    let kick = Arc::new(Reference::new(&kick, &stage()).expect("a reference"));
+    let walk = Reference::new(&walk, &stage()).expect("a reference");
+    let mut waited = 0;
+    for start in 0..8 {
+        let mut env = environment("walk.glb", Some(LoopMode::Wrap), 20.0);
+        let told = 0.13 * f64::from(start);
+        env.reset(told);
+        env.lead_to(&kick);
+        let action = vec![0.0; env.action_size()];
+        let mut steps = 0;
+        while env.is_leading() {
+            env.step(&action);
+            steps += 1;
+        }
+        assert!(steps <= 30, "{steps} steps");
+        waited += steps;
+        let far = |time: f64| {
+            let mut sample = walk.blank();
+            walk.sample(time, &mut sample);
+            kick.distance(&sample)
+        };
+        assert!(far(told + f64::from(steps) / 30.0) <= far(told) + 1e-6);
+    }
+    assert!(waited > 0);
 }
