@@ -33,7 +33,9 @@ Examples:
 
 Presets (docs/presets.md has every value):
   default     ours: rotations added to the reference's, learned in minutes
-  deepmimic   Peng et al. 2018: absolute targets, the paper's reward and rates; for 60M samples
+  deepmimic   the reward and rates of Peng et al. 2018, learned as in ours
+  deepmimic2018
+              Peng et al. 2018 with its learner too: absolute targets, a large network; for 60M samples
   booth2020   Booth & Ivanov 2020, on the character `marathon`: 258 observations, 21 targets, angular momentum, starts
               at the first frame alone, ends at a reward threshold; for 128M samples
 `--set` changes any single value of them, by its path in the run's config.json under `plan`.
@@ -55,7 +57,7 @@ pub struct Args {
     /// What is learned
     #[arg(long, value_enum, default_value_t)]
     task: Task,
-    /// Settings to start from: `default`, `deepmimic`, `booth2020`, those of a run, or a JSON file with a plan as in a
+    /// Settings to start from: `default`, `deepmimic`, `deepmimic2018`, `booth2020`, those of a run, or a JSON file with a plan as in a
     /// run's config.json
     #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
     preset: String,
