@@ -139,7 +139,7 @@ impl Imitate {
 
     /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
     /// from where and whither the present one has brought the character, within 0.4 s from its pose to the new one's,
-    /// and within a second from its speed.
+    /// and within a second from its speed. In that second the new one follows the agent along the ground.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         let mut present = self.reference.blank();
         self.wanted(&mut present);
@@ -386,10 +386,12 @@ impl Imitate {
         }
     }
 
-    /// Where a cycle begins, the reference is moved to the agent.
+    /// Where a cycle begins, the reference is moved to the agent; so it is while one motion goes over into another, for
+    /// nobody can say beforehand how fast a character gathers speed.
     fn follow(&mut self) {
         let dt = self.setting.physics.control_dt();
-        if self.setting.cycles_follow && self.reference.begins_cycle(self.time, dt) {
+        let begins = self.setting.cycles_follow && self.reference.begins_cycle(self.time, dt);
+        if begins || self.transition.eases(self.time) {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
             self.transition.shift(apart);

@@ -83,6 +83,11 @@ impl Transition {
         blend.is_some()
     }
 
+    /// Whether the speed of the motion before is still felt at `time` seconds.
+    pub fn eases(&self, time: f64) -> bool {
+        self.blend.is_some() && time < self.since + EASES
+    }
+
     /// The same motion, moved on along the ground.
     pub fn shift(&mut self, by: Vector3<f32>) {
         let along = Vector3::new(by.x, by.y, 0.0);
