@@ -14,6 +14,8 @@ pub(super) mod weight {
     /// Points below the ground, per metre: at first, and where some are left too deep.
     pub const GROUND: f64 = 16.0;
     pub const STIFF_GROUND: [f64; 2] = [60.0, 200.0];
+    /// Limbs in each other or in the trunk, per metre.
+    pub const OVERLAP: f64 = 3.0;
     /// Coordinates outside of their limits, per radian: at first, and where some are left outside.
     pub const LIMIT: f64 = 3.0;
     pub const STIFF_LIMITS: [f64; 2] = [30.0, 300.0];
@@ -100,6 +102,7 @@ impl Problem<'_> {
             + self.turns(f, pose, &mut columns, to)
             + self.stance(f, pose, &mut columns, to)
             + self.ground(pose, &mut columns, to)
+            + self.overlaps(pose, &mut columns, to)
             + self.joints(f, qpos, &mut columns, to)
     }
 
@@ -160,6 +163,34 @@ impl Problem<'_> {
                     .for_each(|(_, lever)| *lever = Vector3::new(0.0, 0.0, lever.z));
                 cost += to.add(columns, &Vector3::new(0.0, 0.0, below), self.ground);
             }
+        }
+        cost
+    }
+
+    fn overlaps(&self, pose: &Pose, columns: &mut Columns, to: &mut Normal) -> f64 {
+        let overlaps = self
+            .model
+            .pairs
+            .iter()
+            .filter_map(|pair| pair.in_pose(pose));
+        let mut cost = 0.0;
+        for overlap in overlaps {
+            let [one, other] = overlap.bodies;
+            let [p, q] = &overlap.points;
+            self.levers(one, pose, p, columns);
+            for dof in &self.model.chains[other] {
+                let lever = -self.model.lever(pose, *dof, q);
+                match columns.iter_mut().find(|(own, _)| own == dof) {
+                    Some((_, both)) => *both += lever,
+                    None => columns.push((*dof, lever)),
+                }
+            }
+            columns.sort_unstable_by_key(|(dof, _)| *dof);
+            for (_, lever) in columns.iter_mut() {
+                *lever = Vector3::new(lever.dot(&overlap.normal), 0.0, 0.0);
+            }
+            let r = Vector3::new(-overlap.depth, 0.0, 0.0);
+            cost += to.add(columns, &r, weight::OVERLAP);
         }
         cost
     }

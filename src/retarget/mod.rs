@@ -13,6 +13,7 @@ mod footing;
 mod goals;
 mod ground;
 mod model;
+mod overlap;
 mod reach;
 mod reference;
 mod report;

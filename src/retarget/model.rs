@@ -1,5 +1,6 @@
 //! The skeleton as the solver sees it: poses, and how every point moves with every degree of freedom.
 
+use super::overlap::{self, Pair};
 use super::rotation::{exp, log};
 use crate::skeleton::{Joint, JointKind, Shape, Skeleton};
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
@@ -22,6 +23,8 @@ pub(super) struct Model<'a> {
     pub turns: Vec<bool>,
     /// Spheres' centres, capsules' ends and boxes' corners.
     pub knobs: Vec<Knob>,
+    /// What must not pass through each other.
+    pub pairs: Vec<Pair>,
 }
 
 /// World transforms of all bodies, and world axis and pivot of every degree of freedom.
@@ -70,6 +73,7 @@ impl<'a> Model<'a> {
             chains,
             turns,
             knobs,
+            pairs: overlap::pairs(skeleton),
         }
     }
 

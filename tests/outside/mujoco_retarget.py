@@ -10,10 +10,12 @@ For every pair:
   still there; cm/s
 - penetration: deepest point of any shape below z = 0; cm
 - limits: coordinates more than 1e-6 outside of their range
+- overlap: how deep shapes are in each other at most, those that are apart at rest and whose bodies are neither joined nor
+  hang on the same one; mean over frames, and most; cm
 - jumps: the greatest step of a key point from a frame to the next beyond the source's own; cm
 
 Prints a line for each and a summary. Exits 1 when, over all, the median of the key points exceeds CM (3), mean skate
-2 cm/s, any penetration 1 cm, or any limit is violated. Needs the packages mujoco, numpy and safetensors.
+2 cm/s, mean overlap 0.2 cm, any penetration 1 cm, or any limit is violated. Needs the packages mujoco, numpy and safetensors.
 """
 
 import argparse
@@ -78,6 +80,21 @@ class Rig:
         slots = json.loads(path.with_suffix(".json").read_text())["slots"]
         self.body = {s: mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, n) for s, n in slots.items()}
         self.shapes = [g for g in range(self.model.ngeom) if self.model.geom_bodyid[g] > 0]
+        self.pose(np.r_[0, 0, 0, self.model.qpos0[3:]])
+        pairs = [(a, b) for i, a in enumerate(self.shapes) for b in self.shapes[i + 1 :] if not self.joined(a, b)]
+        self.apart = [(a, b) for a, b in pairs if self.depth(a, b) <= 0]
+
+    def joined(self, a, b):
+        a, b = self.model.geom_bodyid[a], self.model.geom_bodyid[b]
+        up = self.model.body_parentid
+        return a == b or up[a] == b or up[b] == a or up[a] == up[b]
+
+    def depth(self, a, b):
+        return -mujoco.mj_geomDistance(self.model, self.data, a, b, 0.001, None)
+
+    def overlap(self):
+        """Of the pose set last."""
+        return max((self.depth(a, b) for a, b in self.apart), default=0.0)
 
     def pose(self, qpos):
         self.data.qpos[:] = qpos
@@ -198,13 +215,14 @@ def measure(rig, clip, motion):
     scale = leg(ours) / leg(rest)
     qpos, fps = m["qpos"], moved["fps"]
     corners = rig.corners()
-    bodies, surfaces, depth, outside = [], [], 0.0, 0
+    bodies, surfaces, overlaps, depth, outside = [], [], [], 0.0, 0
     for q in qpos:
         bodies.append(rig.pose(q))
         at = rig.surface(corners)
         surfaces.append(at)
         depth = max(depth, max(c[2] - p[:, 2].min() for c, p in zip(corners, at)))
         outside += rig.outside(q)
+        overlaps.append(max(rig.overlap(), 0.0))
     bodies = np.array(bodies)
     count = min(len(qpos), len(world))
     at = {s: bodies[:count, b] for s, b in rig.body.items()}
@@ -236,6 +254,7 @@ def measure(rig, clip, motion):
         "skate_cm_s": np.array(speeds) * 100,
         "penetration_cm": depth * 100,
         "outside": outside,
+        "overlap_cm": np.array(overlaps) * 100,
         "jump_cm": max((j.max(initial=0.0) for j in jumps), default=0.0) * 100,
     }
 
@@ -257,12 +276,13 @@ def main():
     arguments = parser.parse_args()
     as_json, files = arguments.json, arguments.files
     rig = Rig(arguments.skeleton)
-    keypoints, skates, ok = [], [], True
+    keypoints, skates, overlaps, ok = [], [], [], True
     rows = []
     for clip, motion in zip(files[::2], files[1::2]):
         r = measure(rig, clip, motion)
         keypoints.append(r["keypoints_cm"])
         skates.append(r["skate_cm_s"])
+        overlaps.append(r["overlap_cm"])
         ok &= r["penetration_cm"] <= 1.0 and r["outside"] == 0
         row = {
             "motion": pathlib.Path(motion).stem,
@@ -272,6 +292,8 @@ def main():
             "still_frames": len(r["skate_cm_s"]),
             "penetration_cm": float(r["penetration_cm"]),
             "outside": r["outside"],
+            "overlap_mean_cm": float(r["overlap_cm"].mean()),
+            "overlap_max_cm": float(r["overlap_cm"].max()),
             "jump_cm": float(r["jump_cm"]),
         }
         rows.append(row)
@@ -285,8 +307,10 @@ def main():
         "skate_mean_cm_s": float(skate.mean()) if len(skate) else 0.0,
         "penetration_max_cm": max(r["penetration_cm"] for r in rows),
         "outside": sum(r["outside"] for r in rows),
+        "overlap_mean_cm": float(np.concatenate(overlaps).mean()),
     }
     ok &= total["keypoints_median_cm"] <= arguments.keypoints and total["skate_mean_cm_s"] <= 2.0
+    ok &= total["overlap_mean_cm"] <= 0.2
     print(json.dumps({"rows": rows, "total": total}) if as_json else json.dumps(total))
     sys.exit(0 if ok else 1)
 
