@@ -22,6 +22,10 @@ const ELSEWHERE: f64 = 0.12;
 const HIGHER: f64 = 0.07;
 /// Height of the lowest point of a clip without stances that may be a flight, leg lengths.
 const FLIGHT: f64 = 1.5;
+/// How far below the ball of the foot the tip of one without toes is when the source stands on its toes, leg lengths: what is
+/// tried.
+const TIPTOE: [f64; 3] = [0.0, 0.04, 0.08];
+const MUCH_LONGER: f64 = 1.5;
 /// Steps in which an unknown lift is told, so that the same rig gets the same in a longer or shorter clip, metres.
 const STEP: f64 = 0.01;
 /// Share of the frames in which something may be below the lowest point.
@@ -52,7 +56,7 @@ pub(super) fn find(
         |points: &[Vec<Vector3<f64>>], floor: f64| standing(points, floor, fps, leg, loop_mode);
     let lowest = low(&points.all);
     // A rig of unknown soles may stand a little higher.
-    let feet = standing(&points.soles, expected)
+    let feet = most_stood_on(&points.soles, expected, fps, leg, loop_mode)
         .or_else(|| standing(&points.soles, expected + HIGHER * leg));
     let off = match feet {
         Some(level) if (level - expected).abs() <= NOISE * leg => return trusted,
@@ -67,12 +71,35 @@ pub(super) fn find(
     };
     // Wherever the body as a whole stands, or else its lowest point.
     let elsewhere = |floor: f64| Ground { floor, lift: 0.0 };
-    let low_stance = standing(&points.all, lowest);
+    let low_stance = most_stood_on(&points.all, lowest, fps, leg, loop_mode);
     match low_stance {
         Some(level) if off || level - expected > ELSEWHERE * leg => elsewhere(level),
         None if off => elsewhere(lowest),
         _ => trusted,
     }
+}
+
+/// The level at or a little above `lowest` on which the points stand: a higher one only if they do so much longer there, for
+/// the tip of a foot on its toes is below its ball.
+fn most_stood_on(
+    points: &[Vec<Vector3<f64>>],
+    lowest: f64,
+    fps: f64,
+    leg: f64,
+    loop_mode: LoopMode,
+) -> Option<f64> {
+    let mut best: Option<(f64, f64)> = None;
+    for higher in TIPTOE {
+        let floor = lowest + higher * leg;
+        let stands = contact::detect_above(points, floor, fps, leg, loop_mode);
+        let frames = stands.iter().filter(|stands| **stands).count() as f64;
+        let level = standing(points, floor, fps, leg, loop_mode);
+        let longer = best.is_none_or(|(longest, _)| frames > MUCH_LONGER * longest);
+        if let Some(level) = level.filter(|_| longer) {
+            best = Some((frames, level));
+        }
+    }
+    best.map(|(_, level)| level)
 }
 
 /// The lowest point of all, but for a few frames.
@@ -155,6 +182,8 @@ mod tests {
             let found = ground(|_| height, |_| height + 0.5, None);
             assert_eq!((found.floor, found.lift), (height, 0.0));
         }
+        let on_toes = |t: f64| if t < 0.35 { 2.95 } else { 3.0 };
+        assert_eq!(ground(on_toes, |_| 4.0, None).floor, 3.0);
         let lying = ground(|_| 2.0, |_| -1.0, None);
         assert_eq!((lying.floor, lying.lift), (-1.0, 0.0));
     }

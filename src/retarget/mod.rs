@@ -139,11 +139,13 @@ pub fn retarget(
     swing::hang(&mut goals, ankle_height(skeleton), leg);
     let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
     let cycle = wraps.then(|| seam::cycle(&goals, &model));
+    let mut closed = None;
     if let Some(cycle) = &cycle {
         problems.extend(seam::gap_problem(&goals, &model));
-        seam::close(&mut goals, cycle, &model, clip.fps);
+        closed = Some(seam::close(&mut goals, cycle, &model, clip.fps));
     }
-    let mut anchors = stance::plant(&model, &mut goals, &contacts, clip.fps, leg, cycle.as_ref());
+    let seam = cycle.as_ref().zip(closed.as_ref());
+    let mut anchors = stance::plant(&model, &mut goals, &contacts, clip.fps, leg, seam);
     let fit = Fit {
         model: &model,
         anchors: &anchors,

@@ -15,6 +15,8 @@ const NOTICEABLE: f64 = 0.1;
 const SPREAD: f64 = 0.25;
 /// The same as a part of the cycle; the smaller counts.
 const SHARE: f64 = 0.1;
+/// Metres by which a point that stands is moved and still looks as if it stood.
+const HIDES: f64 = 0.01;
 
 /// The turn about Z and shift over the ground that carry the first frame's root to the last frame's. A turn no
 /// larger than the gap that the joints leave at the seam is part of that gap: such a cycle goes straight.
@@ -64,8 +66,23 @@ pub(super) fn gap_problem(goals: &Goals, model: &Model) -> Option<Problem> {
     })
 }
 
+/// Frames that were moved to close a loop, and how far each key point was in the worst of them, metres.
+pub(super) struct Closed {
+    spread: usize,
+    last: usize,
+    moved: Vec<f64>,
+}
+
+impl Closed {
+    /// Whether a key point was moved so far around frame `f` that one that stood doesn't look so any more.
+    pub fn hides_stance(&self, key: usize, f: usize) -> bool {
+        let near = f <= self.spread || f + self.spread >= self.last;
+        near && self.moved[key] > HIDES
+    }
+}
+
 /// Closes the loop of the goals: half of the gap is faded into the frames after the seam, half into those before.
-pub(super) fn close(goals: &mut Goals, cycle: &Cycle, model: &Model, fps: f64) {
+pub(super) fn close(goals: &mut Goals, cycle: &Cycle, model: &Model, fps: f64) -> Closed {
     let last = goals.frames() - 1;
     let turn = exp(&(Vector3::z() * cycle.heading));
     let carry = |p: &Vector3<f64>| turn * p + cycle.translation;
@@ -102,6 +119,11 @@ pub(super) fn close(goals: &mut Goals, cycle: &Cycle, model: &Model, fps: f64) {
             &turn.inverse(),
             model,
         );
+    }
+    Closed {
+        spread,
+        last,
+        moved: gaps.iter().map(|gap| gap.norm() / 2.0).collect(),
     }
 }
 

@@ -6,6 +6,7 @@ use super::ground::Points;
 use super::model::{Model, Pose};
 use super::report::Contact;
 use super::rest::stances;
+use super::seam::Closed;
 use super::source::HANDS;
 use crate::clip::LoopMode;
 use crate::humanoid::Slot;
@@ -280,16 +281,21 @@ pub(super) fn plant(
     contacts: &[Contacts],
     fps: f64,
     leg: f64,
-    cycle: Option<&Cycle>,
+    seam: Option<(&Cycle, &Closed)>,
 ) -> Vec<Vec<Anchor>> {
     let limbs = limbs(model, goals);
-    let timeline = Timeline::new(goals.frames(), cycle);
+    let timeline = Timeline::new(goals.frames(), seam.map(|(cycle, _)| cycle));
     let mut anchors = vec![Vec::new(); goals.frames()];
     for (limb, paths) in limbs.iter().zip(paths(model, goals, &limbs)) {
         let paths: Vec<Vec<Vector3<f64>>> = paths.iter().map(|p| timeline.extend(p)).collect();
         let slot = goals.keys[limb.key].slot;
         let touches = contacts.iter().find(|contact| contact.0 == slot);
-        let touches = touches.map(|(_, flags)| timeline.repeat(flags));
+        let hidden = |f: usize| seam.is_some_and(|(_, closed)| closed.hides_stance(limb.key, f));
+        // What a closed seam moved is believed to stand where the source's does, as hands are everywhere.
+        let believed = |(f, touches): (usize, &bool)| *touches && (!limb.is_foot || hidden(f));
+        let told =
+            |flags: &Vec<bool>| -> Vec<bool> { flags.iter().enumerate().map(believed).collect() };
+        let touches = touches.map(|(_, flags)| timeline.repeat(&told(flags)));
         let held = held(model, limb, &paths, touches.as_deref(), fps, leg);
         let own: Vec<Vector3<f64>> = goals.points.iter().map(|points| points[limb.key]).collect();
         let moves = footing::moves(&held, &timeline.extend(&own), fps);
@@ -308,8 +314,8 @@ pub(super) fn plant(
     anchors
 }
 
-/// The knobs of a limb that stand, by frame. Feet stand where they rest low; hands where the source's do, which holds
-/// its wrist higher.
+/// The knobs of a limb that stand, by frame. Feet stand where they rest low or the source says so; hands where the source's
+/// do, which holds its wrist higher.
 fn held(
     model: &Model,
     limb: &Limb,
@@ -326,10 +332,11 @@ fn held(
         let weights: Vec<f64> = if limb.is_foot {
             let sole = |p: &Vector3<f64>| vec![p - Vector3::z() * radius];
             let soles: Vec<Vec<Vector3<f64>>> = path.iter().map(sole).collect();
-            let stands = contact::detect_above(&soles, 0.0, fps, leg, LoopMode::Clamp);
+            let rests = contact::detect_above(&soles, 0.0, fps, leg, LoopMode::Clamp);
             let weight = |f: usize| ramp(HELD, bottom(k, f) / leg);
+            let stands = |f: usize| rests[f] || touches.is_some_and(|t| t[f]);
             (0..frames)
-                .map(|f| if stands[f] { weight(f) } else { f64::NAN })
+                .map(|f| if stands(f) { weight(f) } else { f64::NAN })
                 .collect()
         } else {
             let lowest = |f: usize| (0..paths.len()).all(|o| bottom(k, f) < bottom(o, f) + PALM);

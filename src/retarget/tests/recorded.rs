@@ -107,6 +107,37 @@ fn a_jump_falls_and_spins_freely() {
     }
 }
 
+/// The loop of this run lacks 4 cm of the right foot's height, in the midst of its stance.
+#[test]
+fn a_foot_stands_over_a_seam_that_does_not_close() {
+    let Some(run) = clip("deepmimic/humanoid3d_run.txt", None) else {
+        return;
+    };
+    let motion = on_humanoid(&run).motion;
+    let frames = motion.tracks.contact.len();
+    for foot in 0..motion.contact_bodies.len() {
+        let stands = motion.tracks.contact.iter().filter(|row| row[foot]);
+        let share = stands.count() as f64 / frames as f64;
+        assert!((0.12..0.4).contains(&share), "foot {foot}: {share}");
+    }
+}
+
+/// A boxer who is on his toes for a third of the time, in a file whose ground is elsewhere.
+#[test]
+fn a_boxer_on_his_toes_does_not_lift_the_ground() {
+    let Some(boxing) = clip("poser-bvh/boxing.bvh", None) else {
+        return;
+    };
+    let motion = on_humanoid(&boxing).motion;
+    let stands = motion
+        .tracks
+        .contact
+        .iter()
+        .filter(|row| row.contains(&true));
+    let share = stands.count() as f64 / motion.tracks.contact.len() as f64;
+    assert!(share > 0.9, "{share}");
+}
+
 #[test]
 fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
     let Some(path) = data("characters/mimickit_humanoid.xml") else {
