@@ -261,9 +261,7 @@ impl Player {
         actor: &Actor,
         references: &[Arc<Reference>],
     ) -> Outcome {
-        if !self.env.is_leading() {
-            self.motion = self.upcoming;
-        }
+        self.note_arrival();
         let due = outcome == Outcome::Running && self.env.elapsed() >= self.next_change;
         if transitions_s.is_none() || !(due || outcome == Outcome::Finished) {
             return outcome;
@@ -271,12 +269,16 @@ impl Player {
         self.upcoming = actor.starts.draw(&mut self.rng).motion;
         let elapsed = self.env.elapsed();
         self.env.lead_to(&references[self.upcoming]);
-        if !self.env.is_leading() {
-            self.motion = self.upcoming;
-        }
+        self.note_arrival();
         self.plan_change(transitions_s);
         self.next_change += elapsed;
         Outcome::Running
+    }
+
+    fn note_arrival(&mut self) {
+        if !self.env.is_leading() {
+            self.motion = self.upcoming;
+        }
     }
 
     fn plan_change(&mut self, transitions_s: Option<[f64; 2]>) {

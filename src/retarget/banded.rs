@@ -30,7 +30,17 @@ pub(super) struct Factor {
     rows: Vec<f64>,
 }
 
+/// Numbers of a block's row in a [`Factor`].
+fn stride(n: usize) -> usize {
+    (3 * n + WIDE).next_multiple_of(WIDE)
+}
+
 impl Pentadiagonal {
+    /// Memory of a block row, bytes.
+    pub fn bytes(n: usize) -> usize {
+        8 * n * (n + 2 * BAND)
+    }
+
     pub fn new(n: usize, count: usize) -> Pentadiagonal {
         let couplings = || vec![[0.0; BAND]; n * count];
         Pentadiagonal {
@@ -76,9 +86,14 @@ const TALL: usize = 4;
 const WIDE: usize = 8;
 
 impl Factor {
+    /// Memory of a block row, bytes.
+    pub fn bytes(n: usize) -> usize {
+        8 * n * stride(n)
+    }
+
     /// Room for the factor of such systems.
     pub fn new(n: usize, count: usize) -> Factor {
-        let stride = (3 * n + WIDE).next_multiple_of(WIDE);
+        let stride = stride(n);
         Factor {
             n,
             count,

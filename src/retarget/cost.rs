@@ -172,7 +172,7 @@ impl Problem<'_> {
             .model
             .pairs
             .iter()
-            .filter_map(|pair| pair.in_pose(pose));
+            .filter_map(|pair| pair.overlap(&pose.bodies));
         let mut cost = 0.0;
         for overlap in overlaps {
             let [one, other] = overlap.bodies;

@@ -52,12 +52,12 @@ pub(super) fn find(
         floor: 0.0,
         lift: expected,
     };
-    let standing =
-        |points: &[Vec<Vector3<f64>>], floor: f64| standing(points, floor, fps, leg, loop_mode);
     let lowest = low(&points.all);
     // A rig of unknown soles may stand a little higher.
-    let feet = most_stood_on(&points.soles, expected, fps, leg, loop_mode)
-        .or_else(|| standing(&points.soles, expected + HIGHER * leg));
+    let feet = most_stood_on(&points.soles, expected, fps, leg, loop_mode).or_else(|| {
+        let higher = expected + HIGHER * leg;
+        standing(&points.soles, higher, fps, leg, loop_mode).map(|(_, level)| level)
+    });
     let off = match feet {
         Some(level) if (level - expected).abs() <= NOISE * leg => return trusted,
         Some(level) if (level - expected).abs() <= ELSEWHERE * leg => {
@@ -88,18 +88,15 @@ fn most_stood_on(
     leg: f64,
     loop_mode: LoopMode,
 ) -> Option<f64> {
-    let mut best: Option<(f64, f64)> = None;
-    for higher in TIPTOE {
+    let levels = TIPTOE.into_iter().filter_map(|higher| {
         let floor = lowest + higher * leg;
-        let stands = contact::detect_above(points, floor, fps, leg, loop_mode);
-        let frames = stands.iter().filter(|stands| **stands).count() as f64;
-        let level = standing(points, floor, fps, leg, loop_mode);
-        let longer = best.is_none_or(|(longest, _)| frames > MUCH_LONGER * longest);
-        if let Some(level) = level.filter(|_| longer) {
-            best = Some((frames, level));
-        }
-    }
-    best.map(|(_, level)| level)
+        standing(points, floor, fps, leg, loop_mode)
+    });
+    let longest = levels.reduce(|best, next| {
+        let longer = next.0 as f64 > MUCH_LONGER * best.0 as f64;
+        if longer { next } else { best }
+    });
+    longest.map(|(_, level)| level)
 }
 
 /// The lowest point of all, but for a few frames.
@@ -117,23 +114,22 @@ fn bottom(points: &[Vector3<f64>]) -> f64 {
     points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
 }
 
-/// A little less than the median of the lowest points while something stands at or below `floor`: a foot that lies is higher.
+/// For how many frames something stands at or below `floor`, and a little less than the median of the lowest points in them:
+/// a foot that lies is higher.
 fn standing(
     points: &[Vec<Vector3<f64>>],
     floor: f64,
     fps: f64,
     leg: f64,
     loop_mode: LoopMode,
-) -> Option<f64> {
+) -> Option<(usize, f64)> {
     let stands = contact::detect_above(points, floor, fps, leg, loop_mode);
     let frames = points.iter().zip(stands).filter(|(_, stands)| *stands);
     let mut heights: Vec<f64> = frames.map(|(frame, _)| bottom(frame)).collect();
     heights.sort_by(f64::total_cmp);
     let enough = heights.len() as f64 >= (LONG_ENOUGH * fps).max(2.0);
-    heights
-        .get(heights.len() * 2 / 5)
-        .copied()
-        .filter(|_| enough)
+    let level = heights.get(heights.len() * 2 / 5).filter(|_| enough)?;
+    Some((heights.len(), *level))
 }
 
 #[cfg(test)]

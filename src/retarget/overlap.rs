@@ -1,6 +1,5 @@
-//! Limbs that would pass through each other or the trunk.
+//! Self-collision: limbs that would pass through each other or the trunk.
 
-use super::model::Pose;
 use crate::skeleton::{Shape, Skeleton};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -76,12 +75,8 @@ impl Piece {
 }
 
 impl Pair {
-    /// What of the two is in each other in this pose.
-    pub fn in_pose(&self, pose: &Pose) -> Option<Overlap> {
-        self.overlap(&pose.bodies)
-    }
-
-    fn overlap(&self, bodies: &[Isometry3<f64>]) -> Option<Overlap> {
+    /// Where the two are in each other, with all bodies at these places.
+    pub fn overlap(&self, bodies: &[Isometry3<f64>]) -> Option<Overlap> {
         let [one, other] = &self.0;
         let (first, second) = (&bodies[one.body], &bodies[other.body]);
         let (a, reach) = one.middle_and_reach(first);

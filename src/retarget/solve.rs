@@ -1,7 +1,7 @@
 //! The whole trajectory in one least-squares problem: Levenberg–Marquardt over all frames at once, or, where these
 //! are many, over one window of them after the other.
 
-use super::banded::Factor;
+use super::banded::{Factor, Pentadiagonal};
 use super::cost::{Part, Problem, parts};
 use super::rotation::exp;
 use super::system::{Step, System, Window};
@@ -30,8 +30,8 @@ const ON_GAIN: f64 = 0.3;
 const ON_LOSS: f64 = 30.0;
 /// Rounds in which the seam of a cycle is brought into a step.
 const SEAM_ROUNDS: usize = 4;
-/// Memory for a window's equations, bytes: about 2,300 frames of a humanoid.
-const MEMORY: usize = 106 << 20;
+/// Memory for a window's equations, those of a trial and their factor, bytes: about 1,200 frames of a humanoid.
+const MEMORY: usize = 64 << 20;
 /// Time by which a window reaches back into the one before, so that those frames see what comes after them, s.
 const OVERLAP: f64 = 1.0;
 /// Fewest frames in a window, whatever the skeleton.
@@ -60,12 +60,13 @@ impl<'a> Solver<'a> {
             (*turn.matrix(), c.translation)
         };
         let n = problem.model.skeleton.nv;
+        let frame = 2 * Pentadiagonal::bytes(n) + Factor::bytes(n);
         Solver {
             problem,
             parts: parts(problem.model),
             cycle: cycle.map(step),
             n,
-            longest: (MEMORY / (40 * n * n).max(1)).max(SHORTEST_WINDOW),
+            longest: (MEMORY / frame.max(1)).max(SHORTEST_WINDOW),
         }
     }
 

@@ -401,8 +401,7 @@ impl Imitate {
     fn look_ahead(&mut self) {
         let time = self.time + self.setting.physics.control_dt();
         // Taken out for the moment, so that its room is used again.
-        let blank = Sample::default();
-        let mut next = std::mem::replace(&mut self.next, blank);
+        let mut next = std::mem::take(&mut self.next);
         self.wanted_at(time, &mut next);
         self.next = next;
     }
