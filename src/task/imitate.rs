@@ -41,12 +41,13 @@ pub struct Imitate {
     reference: Arc<Reference>,
     /// What leads into the reference.
     transition: Transition,
-    /// What the reference goes over into, and at which time.
+    /// What the reference goes over into, and when so many seconds have passed of it.
     upcoming: Option<(f64, Arc<Reference>)>,
     setting: Setting,
     world: World,
-    time: f64,
-    started: f64,
+    /// Seconds since the episode began, and since this reference did.
+    elapsed: f64,
+    passed: f64,
     /// The reference at the next control step.
     next: Sample,
     dynamics: Dynamics,
@@ -68,11 +69,11 @@ impl Imitate {
             disturbance: None,
             stage,
             reference,
-            transition: Transition::none(),
+            transition: Transition::none(0.0),
             upcoming: None,
             setting: *setting,
-            time: 0.0,
-            started: 0.0,
+            elapsed: 0.0,
+            passed: 0.0,
             dynamics: Dynamics::default(),
         };
         env.reset(0.0);
@@ -101,22 +102,19 @@ impl Imitate {
     /// the present one comes nearest to it; at once where the present one ends.
     pub fn lead_to(&mut self, reference: &Arc<Reference>) {
         let dt = self.setting.physics.control_dt();
-        let end = match self.reference.loop_mode() {
-            LoopMode::Wrap => f64::INFINITY,
-            LoopMode::Clamp => self.reference.duration() - dt,
-        };
         let steps = (WAITS / dt).round() as u32;
         let mut sample = self.blank();
-        let mut best = (f32::INFINITY, self.time);
+        let mut best = (f32::INFINITY, self.passed);
         for step in 0..steps.max(1) {
-            let time = self.time + f64::from(step) * dt;
-            if step > 0 && time > end {
+            let passed = self.passed + f64::from(step) * dt;
+            let time = self.transition.time(passed);
+            if step > 0 && self.reference.is_over(time) {
                 break;
             }
-            self.wanted_at(time, &mut sample);
+            self.wanted_after(passed, &mut sample);
             let distance = reference.distance(&sample);
             if distance < best.0 {
-                best = (distance, time);
+                best = (distance, passed);
             }
         }
         self.upcoming = Some((best.1, reference.clone()));
@@ -129,8 +127,8 @@ impl Imitate {
     }
 
     fn change_in_time(&mut self) {
-        if let Some((time, _)) = self.upcoming
-            && self.time >= time - 1e-9
+        if let Some((passed, _)) = self.upcoming
+            && self.passed >= passed - 1e-9
             && let Some((_, reference)) = self.upcoming.take()
         {
             self.change_to(&reference);
@@ -139,7 +137,8 @@ impl Imitate {
 
     /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
     /// from where and whither the present one has brought the character, within 0.4 s from its pose to the new one's,
-    /// and within a second from its speed. In that second the new one follows the agent along the ground.
+    /// and within a second from its speed. In that second the new one follows the agent along the ground, and reaches its
+    /// own pace: it begins at half to one and a half of it, so as to be as fast as the present one.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         let mut present = self.reference.blank();
         self.wanted(&mut present);
@@ -149,8 +148,7 @@ impl Imitate {
         let character = &self.stage.character;
         self.transition = Transition::between(character, &present, &begun, time);
         self.upcoming = None;
-        self.started += time - self.time;
-        self.time = time;
+        self.passed = 0.0;
         self.reference = reference.clone();
         self.look_ahead();
     }
@@ -162,23 +160,25 @@ impl Imitate {
 
     /// Writes the reference at the present moment.
     pub fn wanted(&self, sample: &mut Sample) {
-        self.wanted_at(self.time, sample);
+        self.wanted_after(self.passed, sample);
     }
 
-    fn wanted_at(&self, time: f64, sample: &mut Sample) {
-        let place = self.transition.at(time);
+    /// The reference when so many seconds have passed since it began.
+    fn wanted_after(&self, passed: f64, sample: &mut Sample) {
+        let place = self.transition.at(passed);
+        let time = self.transition.time(passed);
         self.reference.sample_at(&place, time, sample);
         let character = &self.stage.character;
-        if self.transition.blend(character, time, &mut sample.links) {
+        if self.transition.blend(character, passed, &mut sample.links) {
             sample.dynamics = self.reference.masses().dynamics(&sample.links);
         }
     }
 
     /// Starts an episode in the reference's own state at `time` seconds.
     pub fn reset(&mut self, time: f64) {
-        self.time = time;
-        self.started = time;
-        self.transition = Transition::none();
+        self.elapsed = 0.0;
+        self.passed = 0.0;
+        self.transition = Transition::none(time);
         self.upcoming = None;
         self.reference.sample(time, &mut self.next);
         self.world.reset(&self.next.links);
@@ -235,10 +235,10 @@ impl Imitate {
 
     /// Steps from here to the end of the motion or the time limit, whichever is nearer.
     pub fn possible_steps(&self) -> f64 {
-        let limit = self.setting.episode_s - (self.time - self.started);
+        let limit = self.setting.episode_s - self.elapsed;
         let left = match self.reference.loop_mode() {
             LoopMode::Wrap => limit,
-            LoopMode::Clamp => limit.min(self.reference.duration() - self.time),
+            LoopMode::Clamp => limit.min(self.reference.duration() - self.time()),
         };
         (left * self.setting.physics.control_hz - 1e-6)
             .ceil()
@@ -309,7 +309,8 @@ impl Imitate {
 
     /// What the control step that was taken has led to.
     fn judge(&mut self, stepped: Result<(), Diverged>) -> Step {
-        self.time += self.setting.physics.control_dt();
+        self.elapsed += self.setting.physics.control_dt();
+        self.passed += self.setting.physics.control_dt();
         if stepped.is_err() {
             return Step {
                 reward: 0.0,
@@ -367,16 +368,16 @@ impl Imitate {
 
     /// Seconds since the episode began.
     pub fn elapsed(&self) -> f64 {
-        self.time - self.started
+        self.elapsed
     }
 
     /// Time in the reference, seconds.
     pub fn time(&self) -> f64 {
-        self.time
+        self.transition.time(self.passed)
     }
 
     fn shove(&mut self) {
-        let elapsed = self.time - self.started;
+        let elapsed = self.elapsed;
         let push = self.disturbance.as_mut().and_then(|d| d.push(elapsed));
         if let Some(change) = push {
             let trunk = self.stage.chest_body.unwrap_or(0);
@@ -389,9 +390,10 @@ impl Imitate {
     /// Where a cycle begins, the reference is moved to the agent; so it is while one motion goes over into another, for
     /// nobody can say beforehand how fast a character gathers speed.
     fn follow(&mut self) {
-        let dt = self.setting.physics.control_dt();
-        let begins = self.setting.cycles_follow && self.reference.begins_cycle(self.time, dt);
-        if begins || self.transition.eases(self.time) {
+        let before = self.passed - self.setting.physics.control_dt();
+        let span = [before, self.passed].map(|passed| self.transition.time(passed));
+        let begins = self.setting.cycles_follow && self.reference.begins_cycle(span);
+        if begins || self.transition.eases(self.passed) {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
             self.transition.shift(apart);
@@ -399,10 +401,10 @@ impl Imitate {
     }
 
     fn look_ahead(&mut self) {
-        let time = self.time + self.setting.physics.control_dt();
+        let passed = self.passed + self.setting.physics.control_dt();
         // Taken out for the moment, so that its room is used again.
         let mut next = std::mem::take(&mut self.next);
-        self.wanted_at(time, &mut next);
+        self.wanted_after(passed, &mut next);
         self.next = next;
     }
 
@@ -418,8 +420,8 @@ impl Imitate {
             reward,
         ) {
             Some(failure) => Outcome::Failed(failure),
-            None if self.reference.is_over(self.time) => Outcome::Finished,
-            None if self.time - self.started >= self.setting.episode_s - 1e-9 => Outcome::TimeLimit,
+            None if self.reference.is_over(self.time()) => Outcome::Finished,
+            None if self.elapsed >= self.setting.episode_s - 1e-9 => Outcome::TimeLimit,
             None => Outcome::Running,
         }
     }

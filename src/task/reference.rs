@@ -113,9 +113,10 @@ impl Reference {
         self.loop_mode == LoopMode::Clamp && time >= self.duration - 1e-9
     }
 
-    /// Whether a cycle of a motion that repeats began within the `dt` seconds before `time`.
-    pub fn begins_cycle(&self, time: f64, dt: f64) -> bool {
-        self.split(time).0 > self.split(time - dt).0
+    /// Whether a cycle of a motion that repeats began between these two times.
+    pub fn begins_cycle(&self, span: [f64; 2]) -> bool {
+        let [before, after] = span.map(|time| self.split(time).0);
+        after > before
     }
 
     /// Largest angular momentum of all frames, kg·m²/s.
@@ -152,20 +153,23 @@ impl Reference {
         let last = self.frames.len() - 1;
         let frame = (at.floor() as usize).min(last - 1);
         let blend = (at - frame as f64).clamp(0.0, 1.0) as f32;
-        let offset = place.pose * self.cycle.offset(cycle).cast::<f32>();
+        let place = Placement {
+            pose: place.pose * self.cycle.offset(cycle).cast::<f32>(),
+            ..*place
+        };
         for (link, (a, b)) in sample
             .links
             .iter_mut()
             .zip(self.frames[frame].iter().zip(&self.frames[frame + 1]))
         {
-            *link = moved(&between(a, b, blend), &offset);
-            link.linear += place.velocity;
+            *link = between(a, b, blend);
+            place.put(link);
         }
         sample.dynamics = self.masses.dynamics(&sample.links);
         let nearest = if blend < 0.5 { frame } else { frame + 1 };
         sample.contacts.copy_from_slice(&self.contacts[nearest]);
         sample.phase = (within / self.duration) as f32;
-        sample.anchor = offset * self.start;
+        sample.anchor = place.pose * self.start;
     }
 
     /// Seconds at which this motion is nearest to `sample` of another, whatever their places and headings: the sum over

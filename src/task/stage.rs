@@ -1,5 +1,6 @@
 //! The stage on which a task plays.
 
+use super::reward::joint_weights;
 use super::setting::TaskError;
 use crate::humanoid::Slot;
 use crate::sim::{Character, Link};
@@ -30,6 +31,8 @@ pub struct Stage {
     pub chest_body: Option<usize>,
     /// Heel, left of the toes, right of the toes, of each foot.
     pub soles: Vec<SolePoint>,
+    /// What each link's joint counts for where joints are weighted; their sum is one.
+    pub joint_weights: Vec<f32>,
     /// What divides angular momentum: mass × leg length × √(g × leg length), kg·m²/s.
     pub momentum_scale: f32,
 }
@@ -62,6 +65,7 @@ impl Stage {
             chest_body: body(&Slot::Chest),
             soles: soles(&skeleton, &character),
             end_bodies,
+            joint_weights: joint_weights(&skeleton, &character),
             momentum_scale: (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32,
             skeleton,
             character,

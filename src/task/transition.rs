@@ -7,6 +7,11 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 
 /// Seconds in which the speed of the one becomes that of the other.
 const EASES: f64 = 1.0;
+/// Slowest and fastest pace at which a motion begins, of its own: half a run is a quick walk, and more than half as fast
+/// again asks for forces that it was never seen with.
+const PACES: [f32; 2] = [0.5, 1.5];
+/// A motion that goes slower than this stands, and no pace makes it go, m/s.
+const STANDS: f32 = 0.5;
 
 /// Where and how a motion is performed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,13 +20,16 @@ pub struct Placement {
     pub pose: Isometry3<f32>,
     /// What it slides at besides, m/s, world axes.
     pub velocity: Vector3<f32>,
+    /// How much faster time goes in it.
+    pub pace: f32,
 }
 
 impl Placement {
     /// Puts a link of the motion there.
     pub(super) fn put(&self, link: &mut LinkState) {
         *link = moved(link, &self.pose);
-        link.linear += self.velocity;
+        link.linear = link.linear * self.pace + self.velocity;
+        link.angular *= self.pace;
     }
 
     /// Where the motion itself has it.
@@ -29,6 +37,7 @@ impl Placement {
         Self {
             pose: Isometry3::identity(),
             velocity: Vector3::zeros(),
+            pace: 1.0,
         }
     }
 }
@@ -37,19 +46,22 @@ impl Placement {
 #[derive(Clone, Debug)]
 pub(super) struct Transition {
     place: Isometry3<f32>,
-    /// When it began, seconds of the motion.
-    since: f64,
-    /// How much faster the one before was, m/s, along the ground.
+    /// Where the motion begins, seconds of it.
+    begins: f64,
+    /// The pace at which it begins, of its own.
+    pace: f32,
+    /// How much faster the one before was than it is at that pace, m/s, along the ground.
     surplus: Vector3<f32>,
     blend: Option<Blend>,
 }
 
 impl Transition {
-    /// A motion that nothing leads into.
-    pub fn none() -> Self {
+    /// A motion that nothing leads into, from `time` seconds of it.
+    pub fn none(time: f64) -> Self {
         Self {
             place: Isometry3::identity(),
-            since: 0.0,
+            begins: time,
+            pace: 1.0,
             surplus: Vector3::zeros(),
             blend: None,
         }
@@ -58,24 +70,34 @@ impl Transition {
     /// From where `present` has brought the character into a motion that is at `begun` at `time` seconds.
     pub fn between(character: &Character, present: &Sample, begun: &Sample, time: f64) -> Self {
         let place = anchor(&present.links[0].pose) * anchor(&begun.links[0].pose).inverse();
-        let surplus = present.dynamics.com_velocity - place.rotation * begun.dynamics.com_velocity;
+        let along = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
+        let speed = along(present.dynamics.com_velocity);
+        let own = along(place.rotation * begun.dynamics.com_velocity);
+        let pace = pace(&speed, &own);
         let mut transition = Self {
             place,
-            since: time,
-            surplus: Vector3::new(surplus.x, surplus.y, 0.0),
+            begins: time,
+            pace,
+            surplus: speed - own * pace,
             blend: None,
         };
-        let begins = transition.at(time);
+        let begins = transition.at(0.0);
         let mut links = begun.links.clone();
         links.iter_mut().for_each(|link| begins.put(link));
         transition.blend = Some(Blend::between(character, &present.links, &links));
         transition
     }
 
-    /// Adds to the links of the motion at `time` seconds, where it is performed, what is left of the pose before it; tells
-    /// whether anything is.
-    pub fn blend(&self, character: &Character, time: f64, links: &mut [LinkState]) -> bool {
-        let passed = time - self.since;
+    /// Seconds of the motion when so many have `passed`. With p the pace and τ the share of [`EASES`] that has passed, it
+    /// runs at 1 + (p − 1) (1 − τ)², and so has gained (p − 1) E/3 (1 − (1 − τ)³).
+    pub fn time(&self, passed: f64) -> f64 {
+        let left = left(passed);
+        self.begins + passed + f64::from(self.pace - 1.0) * EASES / 3.0 * (1.0 - left.powi(3))
+    }
+
+    /// Adds to the links of the motion as they are when so many seconds have `passed`, where it is performed, what is left
+    /// of the pose before it; tells whether anything is.
+    pub fn blend(&self, character: &Character, passed: f64, links: &mut [LinkState]) -> bool {
         let blend = self.blend.as_ref().filter(|blend| blend.lasts(passed));
         if let Some(blend) = blend {
             blend.apply(character, passed, links);
@@ -83,9 +105,9 @@ impl Transition {
         blend.is_some()
     }
 
-    /// Whether the speed of the motion before is still felt at `time` seconds.
-    pub fn eases(&self, time: f64) -> bool {
-        self.blend.is_some() && time < self.since + EASES
+    /// Whether the speed of the motion before is still felt when so many seconds have `passed`.
+    pub fn eases(&self, passed: f64) -> bool {
+        self.blend.is_some() && passed < EASES
     }
 
     /// The same motion, moved on along the ground.
@@ -94,14 +116,29 @@ impl Transition {
         self.place = Translation3::from(along) * self.place;
     }
 
-    /// Where the motion is performed at `time` seconds of it. With τ the share of [`EASES`] that has passed it slides at
-    /// Δv (1 − τ)², and has so far gone Δv E/3 (1 − (1 − τ)³).
-    pub fn at(&self, time: f64) -> Placement {
-        let left = (1.0 - (time - self.since) / EASES).clamp(0.0, 1.0) as f32;
-        let way = self.surplus * (EASES as f32 / 3.0 * (1.0 - left * left * left));
+    /// Where and at which pace the motion is performed when so many seconds have `passed`: it slides at Δv (1 − τ)², and has
+    /// so far gone Δv E/3 (1 − (1 − τ)³).
+    pub fn at(&self, passed: f64) -> Placement {
+        let left = left(passed) as f32;
+        let way = self.surplus * (EASES as f32 / 3.0 * (1.0 - left.powi(3)));
         Placement {
             pose: Translation3::from(way) * self.place,
             velocity: self.surplus * (left * left),
+            pace: 1.0 + (self.pace - 1.0) * (left * left),
         }
     }
+}
+
+/// The share of [`EASES`] that is left.
+fn left(passed: f64) -> f64 {
+    (1.0 - passed / EASES).clamp(0.0, 1.0)
+}
+
+/// The pace at which a motion at its `own` velocity is as fast as the one before it in that direction.
+fn pace(speed: &Vector3<f32>, own: &Vector3<f32>) -> f32 {
+    let fast = own.norm();
+    if fast < STANDS {
+        return 1.0;
+    }
+    (speed.dot(own) / (fast * fast)).clamp(PACES[0], PACES[1])
 }

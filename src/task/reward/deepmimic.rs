@@ -34,7 +34,7 @@ pub(super) fn terms(
 }
 
 /// Angular velocity against the parent, in the link's own frame, rad/s; the root's is against the world.
-fn joint_rate(stage: &Stage, links: &[LinkState], i: usize) -> Vector3<f32> {
+pub(super) fn joint_rate(stage: &Stage, links: &[LinkState], i: usize) -> Vector3<f32> {
     let against = stage.character.links[i]
         .parent
         .map_or_else(Vector3::zeros, |p| links[p].angular);

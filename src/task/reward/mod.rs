@@ -3,7 +3,10 @@
 
 mod booth;
 mod deepmimic;
+mod program;
 mod tracking;
+
+pub(super) use program::joint_weights;
 
 use super::dynamics::Dynamics;
 use super::setting::Rewards;
@@ -35,6 +38,8 @@ pub enum Kernels {
     Tracking,
     /// Peng et al. 2018, "DeepMimic", section 5.1: sums over joints.
     Deepmimic,
+    /// The same as its published program has it: sums over weighted joints, and a term for the root.
+    DeepmimicProgram,
     /// Booth & Ivanov 2020 as its published program has it: sums over bodies.
     Booth2020,
 }
@@ -44,6 +49,7 @@ impl std::fmt::Display for Kernels {
         f.write_str(match self {
             Kernels::Tracking => "tracking",
             Kernels::Deepmimic => "deepmimic",
+            Kernels::DeepmimicProgram => "deepmimic-program",
             Kernels::Booth2020 => "booth2020",
         })
     }
@@ -55,6 +61,7 @@ impl Kernels {
         let names: &[&str] = match self {
             Kernels::Tracking => &TERM_NAMES[..7],
             Kernels::Deepmimic => &["pose", "velocity", "end_effector", "com_position"],
+            Kernels::DeepmimicProgram => &["pose", "velocity", "root", "com", "end_effector"],
             Kernels::Booth2020 => &[
                 "pose",
                 "velocity",
@@ -135,6 +142,7 @@ pub fn terms(
     match kernels {
         Kernels::Tracking => tracking::terms(stage, agent, reference),
         Kernels::Deepmimic => deepmimic::terms(stage, agent, reference),
+        Kernels::DeepmimicProgram => program::terms(stage, agent, reference),
         Kernels::Booth2020 => booth::terms(stage, agent, reference),
     }
 }

@@ -44,7 +44,12 @@ fn a_perfect_agent_earns_everything() {
 
 #[test]
 fn kernels_have_their_terms_and_no_others() {
-    for kernels in [Kernels::Tracking, Kernels::Deepmimic, Kernels::Booth2020] {
+    for kernels in [
+        Kernels::Tracking,
+        Kernels::Deepmimic,
+        Kernels::DeepmimicProgram,
+        Kernels::Booth2020,
+    ] {
         let terms = compared(kernels, |_| ());
         for ((name, value), has) in TERM_NAMES.iter().zip(terms.values()).zip(kernels.has()) {
             close(
@@ -85,6 +90,23 @@ fn a_shift_costs_ends_and_centre_as_published() {
     close(terms.com_position, (-d / 0.3).exp(), "centre");
 }
 
+/// The program: the root's place and what is high count, ends as seen from the root don't, but for their height.
+#[test]
+fn a_shift_costs_the_root_and_heights_in_the_program() {
+    let shift = Vector3::new(0.05, -0.1, 0.02);
+    let terms = compared(Kernels::DeepmimicProgram, |links| {
+        for link in links.iter_mut() {
+            link.pose.translation.vector += shift;
+        }
+    });
+    let d = f64::from(shift.norm_squared());
+    close(terms.root, (-5.0 * d).exp(), "root");
+    close(terms.end_effector, (-40.0_f64 * 0.02 * 0.02).exp(), "ends");
+    close(terms.pose * terms.velocity * terms.com, 1.0, "the rest");
+    let weights: f32 = stage().joint_weights.iter().sum();
+    close(weights, 1.0, "all joints");
+}
+
 /// A head turned by θ and turning at ω: one joint of the sums.
 #[test]
 fn a_turned_head_costs_by_the_sum_over_joints() {
@@ -100,6 +122,12 @@ fn a_turned_head_costs_by_the_sum_over_joints() {
     close(terms.pose, (-2.0_f64 * 0.25).exp(), "pose");
     let terms = compared(Kernels::Deepmimic, turning);
     close(terms.velocity, (-0.1_f64 * 4.0).exp(), "velocity");
+    // Of 1 root, 1.5 of trunk and hips, 1.5 of neck, knees and shoulders, 0.8 of ankles and elbows.
+    let share = 0.3 / 4.8;
+    let terms = compared(Kernels::DeepmimicProgram, turned);
+    close(terms.pose, (-2.0 * share * 0.25_f64).exp(), "pose");
+    let terms = compared(Kernels::DeepmimicProgram, turning);
+    close(terms.velocity, (-0.1 * share * 4.0_f64).exp(), "velocity");
     let terms = compared(Kernels::Booth2020, turned);
     close(terms.pose, (-0.25_f64 / 16.0).exp(), "pose");
     let terms = compared(Kernels::Booth2020, turning);

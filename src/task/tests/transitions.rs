@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::task::blend::Blend;
+use crate::task::transition::Transition;
 
 /// An agent that stands in the way of its walk stays behind by most of a cycle; the next cycle begins where it is.
 #[test]
@@ -49,6 +50,7 @@ fn a_motion_is_nearest_to_itself_wherever_it_goes_on() {
     let place = Placement {
         pose: Isometry3::from_parts(Vector3::new(3.0, -1.0, 0.0).into(), turned),
         velocity: Vector3::zeros(),
+        pace: 1.0,
     };
     for time in [0.1, 0.55, 0.9] {
         reference.sample_at(&place, 3.0 * reference.duration() + time, &mut sample);
@@ -97,8 +99,8 @@ fn another_motion_begins_where_the_one_before_has_led() {
     assert!((env.elapsed() - 1.0).abs() < 1e-6);
     let left = (kick.duration() - env.time()).min(3.0);
     assert!((env.possible_steps() - (30.0 * left).ceil()).abs() <= 1.0);
-    let begun = env.time();
-    while env.time() < begun + 1.0 {
+    let begun = env.elapsed();
+    while env.elapsed() < begun + 1.0 {
         env.step(&action);
     }
     let mut alone = env.blank();
@@ -113,6 +115,66 @@ fn another_motion_begins_where_the_one_before_has_led() {
         (speed(&after).norm() - speed(&alone).norm()).abs() < 1e-4,
         "{turn}"
     );
+}
+
+/// A walk goes over into itself at twice the speed: that begins at half its pace, so nothing slides, gathers speed within
+/// a second, and always moves as it says.
+#[test]
+fn a_faster_motion_begins_at_the_pace_of_the_slower_one() {
+    let stage = stage();
+    let walk = motion("walk.glb", Some(LoopMode::Wrap));
+    let mut fast = walk.clone();
+    fast.fps *= 2.0;
+    fast.qvel.iter_mut().flatten().for_each(|v| *v *= 2.0);
+    let [walk, fast] = [walk, fast].map(|m| Reference::new(&m, &stage).expect("a reference"));
+    let (mut present, mut begun) = (walk.blank(), fast.blank());
+    walk.sample(0.4, &mut present);
+    fast.sample(0.2, &mut begun);
+    let transition = Transition::between(&stage.character, &present, &begun, 0.2);
+    let begins = transition.at(0.0);
+    assert!((begins.pace - 0.5).abs() < 1e-3, "{}", begins.pace);
+    assert!(begins.velocity.norm() < 1e-3, "{}", begins.velocity);
+    let led = |passed: f64| {
+        let mut sample = fast.blank();
+        fast.sample_at(&transition.at(passed), transition.time(passed), &mut sample);
+        sample
+    };
+    let alone = |time: f64| {
+        let mut sample = fast.blank();
+        fast.sample(time, &mut sample);
+        sample
+    };
+    // By how much velocities aren't those of the places: a clip's own are those of its frames.
+    let amiss = |[before, now, after]: [Sample; 3], span: f64, i: usize| {
+        let [a, b] = [&before, &after].map(|sample| sample.links[i].pose.translation.vector);
+        ((b - a) / span as f32 - now.links[i].linear).norm()
+    };
+    let step = 0.004;
+    for tenth in 1..12 {
+        let passed = 0.1 * f64::from(tenth);
+        let times = [-step, 0.0, step].map(|by| passed + by);
+        let [first, time, last] = times.map(|passed| transition.time(passed));
+        let pace = transition.at(passed).pace;
+        for i in 0..stage.character.links.len() {
+            let own = amiss([first, time, last].map(alone), last - first, i);
+            let found = amiss(times.map(led), 2.0 * step, i);
+            assert!(
+                (found - pace * own).abs() < 0.02,
+                "{found}, {own} of {i} at {passed}"
+            );
+        }
+        let speed = led(passed).dynamics.com_velocity.norm();
+        let own = alone(time).dynamics.com_velocity.norm();
+        let left = (1.0 - passed).max(0.0).powi(2);
+        let expected = own * (1.0 - 0.5 * left as f32);
+        assert!(
+            (speed - expected).abs() < 0.01,
+            "{speed} m/s, not {expected}"
+        );
+    }
+    assert_eq!(transition.at(1.0).pace, 1.0);
+    let gained = transition.time(1.0) - 0.2;
+    assert!((gained - (1.0 - 0.5 / 3.0)).abs() < 1e-6, "{gained} s");
 }
 
 /// While a pose that stands still takes over from the midst of a kick, places and velocities belong together, limbs keep
