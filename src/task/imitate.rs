@@ -104,6 +104,9 @@ impl Imitate {
         let dt = self.setting.physics.control_dt();
         let steps = (WAITS / dt).round() as u32;
         let mut sample = self.blank();
+        self.wanted(&mut sample);
+        let speed = sample.dynamics.com_velocity.xy().norm();
+        self.transition.slow(self.passed, speed, reference.speed());
         let mut best = (f32::INFINITY, self.passed);
         for step in 0..steps.max(1) {
             let passed = self.passed + f64::from(step) * dt;

@@ -7,6 +7,8 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 
 /// Seconds in which the speed of the one becomes that of the other.
 const EASES: f64 = 1.0;
+/// Seconds in which a motion that is to be left slows down.
+const SLOWS: f64 = 1.0;
 /// Slowest and fastest pace at which a motion begins, of its own: half a run is a quick walk, and more than half as fast
 /// again asks for forces that it was never seen with.
 const PACES: [f32; 2] = [0.5, 1.5];
@@ -53,6 +55,8 @@ pub(super) struct Transition {
     /// How much faster the one before was than it is at that pace, m/s, along the ground.
     surplus: Vector3<f32>,
     blend: Option<Blend>,
+    /// From when on, seconds passed, and to which pace it slows down before it is left.
+    slows: Option<(f64, f64)>,
 }
 
 impl Transition {
@@ -64,6 +68,7 @@ impl Transition {
             pace: 1.0,
             surplus: Vector3::zeros(),
             blend: None,
+            slows: None,
         }
     }
 
@@ -80,6 +85,7 @@ impl Transition {
             pace,
             surplus: speed - own * pace,
             blend: None,
+            slows: None,
         };
         let begins = transition.at(0.0);
         let mut links = begun.links.clone();
@@ -88,11 +94,35 @@ impl Transition {
         transition
     }
 
+    /// From so many seconds `passed` on, a motion at `speed`, m/s, slows down evenly for one at another speed, but to no less
+    /// than half its pace.
+    pub fn slow(&mut self, passed: f64, speed: f32, other: f32) {
+        if speed > other.max(STANDS) {
+            self.slows = Some((passed, f64::from((other / speed).max(PACES[0]))));
+        }
+    }
+
     /// Seconds of the motion when so many have `passed`. With p the pace and τ the share of [`EASES`] that has passed, it
-    /// runs at 1 + (p − 1) (1 − τ)², and so has gained (p − 1) E/3 (1 − (1 − τ)³).
+    /// runs at 1 + (p − 1) (1 − τ)², and so has gained (p − 1) E/3 (1 − (1 − τ)³); with q the pace to which it slows down
+    /// and σ the share of [`SLOWS`] that has passed of that, at (q − 1) σ more, and has gained (q − 1) S (σ²/2, or σ − 1/2
+    /// beyond).
     pub fn time(&self, passed: f64) -> f64 {
-        let left = left(passed);
-        self.begins + passed + f64::from(self.pace - 1.0) * EASES / 3.0 * (1.0 - left.powi(3))
+        let entered = f64::from(self.pace - 1.0) * EASES / 3.0 * (1.0 - left(passed).powi(3));
+        let slowed = self.slows.map_or(0.0, |(since, pace)| {
+            let share = ((passed - since) / SLOWS).max(0.0);
+            let within = share.min(1.0);
+            (pace - 1.0) * SLOWS * (within * within / 2.0 + (share - within))
+        });
+        self.begins + passed + entered + slowed
+    }
+
+    /// How fast time goes in the motion when so many seconds have `passed`.
+    fn pace_after(&self, passed: f64) -> f32 {
+        let entering = (self.pace - 1.0) * left(passed).powi(2) as f32;
+        let slowing = self.slows.map_or(0.0, |(since, pace)| {
+            (pace - 1.0) * ((passed - since) / SLOWS).clamp(0.0, 1.0)
+        });
+        1.0 + entering + slowing as f32
     }
 
     /// Adds to the links of the motion as they are when so many seconds have `passed`, where it is performed, what is left
@@ -124,7 +154,7 @@ impl Transition {
         Placement {
             pose: Translation3::from(way) * self.place,
             velocity: self.surplus * (left * left),
-            pace: 1.0 + (self.pace - 1.0) * (left * left),
+            pace: self.pace_after(passed),
         }
     }
 }

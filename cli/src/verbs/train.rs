@@ -33,9 +33,9 @@ Examples:
 
 Presets (docs/presets.md has every value):
   default     ours: rotations added to the reference's, learned in minutes
-  deepmimic   the reward and rates of Peng et al. 2018, learned as in ours
+  deepmimic   the reward and rates of the program of Peng et al. 2018, learned as in ours
   deepmimic2018
-              Peng et al. 2018 with its learner too: absolute targets, a large network; for 60M samples
+              their paper, with its learner too: absolute targets, a large network; for 60M samples
   booth2020   Booth & Ivanov 2020, on the character `marathon`: 258 observations, 21 targets, angular momentum, starts
               at the first frame alone, ends at a reward threshold; for 128M samples
 `--set` changes any single value of them, by its path in the run's config.json under `plan`.
