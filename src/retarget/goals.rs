@@ -2,6 +2,7 @@
 
 use super::align::Alignment;
 use super::model::Model;
+use super::pace::Paces;
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::skeleton::{Skeleton, limits};
@@ -38,6 +39,8 @@ pub(super) struct Goals {
     pub guess: Vec<Vec<f64>>,
     /// `hanging[f]`: from each ankle's goal to where the ankle is at the end of the skeleton's own leg.
     pub hanging: Vec<[Vector3<f64>; 2]>,
+    /// How fast hinges may turn.
+    pub paces: Paces,
 }
 
 /// Weight of a slot's point, and of its orientation in metres per radian; `by` has multiples of some.
@@ -117,6 +120,7 @@ impl Goals {
             rotations: Vec::with_capacity(clip.frames.len()),
             guess: Vec::with_capacity(clip.frames.len()),
             hanging: Vec::with_capacity(clip.frames.len()),
+            paces: Paces::default(),
         };
         let builder = Builder::new(map, alignment, skeleton);
         for f in 0..clip.frames.len() {
@@ -131,6 +135,7 @@ impl Goals {
             goals.rotations.push(chosen.collect());
             goals.guess.push(qpos);
         }
+        goals.paces = Paces::new(model, &goals, clip.fps);
         goals
     }
 
@@ -144,6 +149,7 @@ impl Goals {
         super::keep(&mut self.rotations, own);
         super::keep(&mut self.guess, own);
         super::keep(&mut self.hanging, own);
+        self.paces.keep(own);
     }
 
     /// Moves everything at frame `f`.

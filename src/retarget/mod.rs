@@ -14,6 +14,7 @@ mod goals;
 mod ground;
 mod model;
 mod overlap;
+mod pace;
 mod reach;
 mod reference;
 mod report;

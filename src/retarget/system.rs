@@ -1,7 +1,7 @@
 //! The equations of a window of frames: what one Gauss–Newton step over all of them needs.
 
 use super::banded::{Factor, Pentadiagonal};
-use super::cost::{Bend, Normal, Part, Problem, bend};
+use super::cost::{Bend, Normal, Part, Problem, bend, weight};
 use super::model::vector;
 use nalgebra::{Matrix3, Vector3};
 
@@ -153,6 +153,9 @@ impl System {
         let mut into = step(middles.start - 1);
         for place in middles {
             let out = step(place);
+            if let (Some(out), Some(f)) = (&out, window.frame(place)) {
+                cost += self.paces(problem, out, f, place);
+            }
             if let (Some(into), Some(out), Some(f)) = (&into, &out, window.frame(place)) {
                 let at = [place - 1, place, place + 1].map(|p| window.inside(p));
                 for part in parts {
@@ -162,6 +165,33 @@ impl System {
                 }
             }
             into = out;
+        }
+        cost
+    }
+
+    /// Penalty on hinges that turn faster than they may in the step `out` of frame `f`, which stands at `place`.
+    fn paces(&mut self, problem: &Problem, out: &[f64], f: usize, place: i64) -> f64 {
+        let at = [place, place + 1].map(|p| self.window.inside(p));
+        let square = weight::PACE * weight::PACE;
+        let mut cost = 0.0;
+        for (dof, most) in problem.goals.paces.of(f) {
+            let excess = out[dof] - out[dof].clamp(-most, most);
+            if excess == 0.0 {
+                continue;
+            }
+            cost += 0.5 * square * excess * excess;
+            for (place, sign) in at.into_iter().zip([-1.0, 1.0]) {
+                let Some(place) = place else { continue };
+                self.gradient[place * self.n + dof] += sign * square * excess;
+                self.couple(
+                    &hinge(dof),
+                    (place, place, 0),
+                    &Matrix3::from_element(square),
+                );
+            }
+            if let [Some(a), Some(b)] = at {
+                self.couple(&hinge(dof), (a, b, 1), &Matrix3::from_element(-square));
+            }
         }
         cost
     }
@@ -203,6 +233,16 @@ impl System {
                 _ => self.band.couple(a, ahead, (row, column), block[(i, k)]),
             }
         }
+    }
+}
+
+/// The part that a hinge is.
+fn hinge(dof: usize) -> Part {
+    Part {
+        dof,
+        size: 1,
+        turns: false,
+        weight: 0.0,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::super::cost::Problem;
 use super::super::goals::{Key, Turn};
+use super::super::pace::Paces;
 use super::super::solve::Solver;
 use super::super::stance::Anchor;
 use super::super::system::Window;
@@ -21,7 +22,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
     let frames: Vec<Vec<f64>> = (0..count).map(|_| wild(0.8)).collect();
     let guess: Vec<Vec<f64>> = (0..count).map(|_| wild(0.3)).collect();
     let bodies: Vec<usize> = skeleton.slots.values().copied().collect();
-    let goals = Goals {
+    let mut goals = Goals {
         keys: bodies
             .iter()
             .map(|b| Key {
@@ -54,7 +55,9 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
             .collect(),
         guess,
         hanging: Vec::new(),
+        paces: Paces::default(),
     };
+    goals.paces = Paces::new(&model, &goals, 30.0);
     let anchor = |knob| Anchor {
         knob,
         at: Vector3::new(0.1, 0.2, 0.0),
@@ -70,7 +73,8 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
 
 #[test]
 fn the_gradient_is_the_derivative_of_the_cost() {
-    let mut skeletons = vec![humanoid()];
+    let marathon = Skeleton::load("marathon").expect("a built-in character");
+    let mut skeletons = vec![humanoid(), marathon];
     skeletons.extend(
         data("characters/mimickit_humanoid.xml").map(|path| Skeleton::load(&path).unwrap()),
     );

@@ -152,6 +152,23 @@ fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
 }
 
 /// In the midst of a cartwheel only hands are down: the feet are no ground to stand on.
+/// Arms of two hinges and an elbow reach backward in one way and forward in another: from a frame to the next they were
+/// 2.6 rad apart.
+#[test]
+fn hinges_go_from_one_way_of_bending_to_another_as_fast_as_limbs_turn() {
+    let Some(clip) = clip("cmu/91_50.fbx", None) else {
+        return;
+    };
+    let marathon = Skeleton::load("marathon").expect("a built-in character");
+    let motion = retarget(&clip, &marathon, &Options::default());
+    let motion = motion.expect("a human's motion").motion;
+    for (f, pair) in motion.qpos.windows(2).enumerate() {
+        let steps = pair[0][7..].iter().zip(&pair[1][7..]);
+        let most = steps.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(most < 1.0, "{most} rad after frame {f}");
+    }
+}
+
 #[test]
 fn a_part_in_which_no_foot_comes_down_keeps_its_height() {
     let options = import::Options {

@@ -2,6 +2,7 @@
 
 use super::super::cost::Problem;
 use super::super::goals::{Key, Turn};
+use super::super::pace::Paces;
 use super::super::solve::Solver;
 use super::*;
 use std::f64::consts::TAU;
@@ -46,6 +47,7 @@ fn swinging(model: &Model) -> Goals {
         rotations: (0..FRAMES).map(rotations).collect(),
         guess: (0..FRAMES).map(|f| pose(f, 0.2)).collect(),
         hanging: Vec::new(),
+        paces: Paces::default(),
     }
 }
 
