@@ -1,6 +1,7 @@
 //! Phase-based imitation: one environment.
 
 use super::aim::aim;
+use super::course::Course;
 use super::observe::{Scene, observation_size, observe};
 use super::perturb::Disturbance;
 use super::reference::{Reference, Sample};
@@ -8,7 +9,6 @@ use super::reward::{Terms, terms};
 use super::setting::Setting;
 use super::stage::Stage;
 use super::terminate::{Failure, failure};
-use super::transition::Transition;
 use crate::clip::LoopMode;
 use crate::sim::{Diverged, LinkState, Target, World};
 use crate::task::Dynamics;
@@ -38,16 +38,11 @@ pub struct Step {
 /// An agent that imitates a reference.
 pub struct Imitate {
     stage: Arc<Stage>,
-    reference: Arc<Reference>,
-    /// What leads into the reference.
-    transition: Transition,
-    /// What the reference goes over into, and when so many seconds have passed of it.
-    upcoming: Option<(f64, Arc<Reference>)>,
+    course: Course,
     setting: Setting,
     world: World,
-    /// Seconds since the episode began, and since this reference did.
+    /// Seconds since the episode began.
     elapsed: f64,
-    passed: f64,
     /// The reference at the next control step.
     next: Sample,
     dynamics: Dynamics,
@@ -67,13 +62,10 @@ impl Imitate {
             last_action: vec![0.0; stage.character.dof],
             touching: Vec::new(),
             disturbance: None,
+            course: Course::new(stage.clone(), reference),
             stage,
-            reference,
-            transition: Transition::none(0.0),
-            upcoming: None,
             setting: *setting,
             elapsed: 0.0,
-            passed: 0.0,
             dynamics: Dynamics::default(),
         };
         env.reset(0.0);
@@ -84,7 +76,7 @@ impl Imitate {
         observation_size(
             self.setting.observations,
             &self.stage,
-            self.reference.contact_links.len(),
+            self.course.reference().contact_links.len(),
         )
     }
 
@@ -94,48 +86,20 @@ impl Imitate {
 
     /// Starts an episode of `reference`, whose contact links are those of the one before.
     pub fn imitate(&mut self, reference: &Arc<Reference>, time: f64) {
-        self.reference = reference.clone();
-        self.reset(time);
+        self.begin(reference, time);
     }
 
     /// Goes over into another `reference`, as by [`Imitate::change_to`], at the control step of the next second at which
     /// the present one comes nearest to it; at once where the present one ends.
     pub fn lead_to(&mut self, reference: &Arc<Reference>) {
-        let dt = self.setting.physics.control_dt();
-        let steps = (WAITS / dt).round() as u32;
-        let mut sample = self.blank();
-        self.wanted(&mut sample);
-        let speed = sample.dynamics.com_velocity.xy().norm();
-        self.transition.slow(self.passed, speed, reference.speed());
-        let mut best = (f32::INFINITY, self.passed);
-        for step in 0..steps.max(1) {
-            let passed = self.passed + f64::from(step) * dt;
-            let time = self.transition.time(passed);
-            if step > 0 && self.reference.is_over(time) {
-                break;
-            }
-            self.wanted_after(passed, &mut sample);
-            let distance = reference.distance(&sample);
-            if distance < best.0 {
-                best = (distance, passed);
-            }
-        }
-        self.upcoming = Some((best.1, reference.clone()));
-        self.change_in_time();
+        self.course
+            .lead_to(reference, self.setting.physics.control_dt());
+        self.look_ahead();
     }
 
     /// Whether [`Imitate::lead_to`] hasn't led to its reference yet.
     pub fn is_leading(&self) -> bool {
-        self.upcoming.is_some()
-    }
-
-    fn change_in_time(&mut self) {
-        if let Some((passed, _)) = self.upcoming
-            && self.passed >= passed - 1e-9
-            && let Some((_, reference)) = self.upcoming.take()
-        {
-            self.change_to(&reference);
-        }
+        self.course.is_leading()
     }
 
     /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
@@ -143,49 +107,35 @@ impl Imitate {
     /// and within a second from its speed. In that second the new one follows the agent along the ground, and reaches its
     /// own pace: it begins at half to one and a half of it, so as to be as fast as the present one.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
-        let mut present = self.reference.blank();
-        self.wanted(&mut present);
-        let time = reference.nearest(&present);
-        let mut begun = reference.blank();
-        reference.sample(time, &mut begun);
-        let character = &self.stage.character;
-        self.transition = Transition::between(character, &present, &begun, time);
-        self.upcoming = None;
-        self.passed = 0.0;
-        self.reference = reference.clone();
+        self.course.change_to(reference);
         self.look_ahead();
     }
 
     /// A sample to write into.
     pub fn blank(&self) -> Sample {
-        self.reference.blank()
+        self.course.reference().blank()
     }
 
     /// Writes the reference at the present moment.
     pub fn wanted(&self, sample: &mut Sample) {
-        self.wanted_after(self.passed, sample);
-    }
-
-    /// The reference when so many seconds have passed since it began.
-    fn wanted_after(&self, passed: f64, sample: &mut Sample) {
-        let place = self.transition.at(passed);
-        let time = self.transition.time(passed);
-        self.reference.sample_at(&place, time, sample);
-        let character = &self.stage.character;
-        if self.transition.blend(character, passed, &mut sample.links) {
-            sample.dynamics = self.reference.masses().dynamics(&sample.links);
-        }
+        self.course.sample(0.0, sample);
     }
 
     /// Starts an episode in the reference's own state at `time` seconds.
     pub fn reset(&mut self, time: f64) {
+        self.begin(&self.course.reference().clone(), time);
+    }
+
+    fn begin(&mut self, reference: &Arc<Reference>, time: f64) {
+        self.course.begin(reference, time);
         self.elapsed = 0.0;
-        self.passed = 0.0;
-        self.transition = Transition::none(time);
-        self.upcoming = None;
-        self.reference.sample(time, &mut self.next);
+        self.course.sample(0.0, &mut self.next);
         self.world.reset(&self.next.links);
-        self.dynamics = self.reference.masses().dynamics(self.world.states());
+        self.dynamics = self
+            .course
+            .reference()
+            .masses()
+            .dynamics(self.world.states());
         // The engine finds contacts only in a step; until then the agent touches what its reference does.
         self.touching.clone_from(&self.next.contacts);
         self.last_action.fill(0.0);
@@ -214,9 +164,15 @@ impl Imitate {
             let body = self.stage.character.links[*link].body;
             skeleton.lowest_point_of(&poses, &[body]) < lowest + STANDING
         };
-        self.touching = self.reference.contact_links.iter().map(stands).collect();
+        self.touching = self
+            .course
+            .reference()
+            .contact_links
+            .iter()
+            .map(stands)
+            .collect();
         self.world.reset(&states);
-        self.dynamics = self.reference.masses().dynamics(&states);
+        self.dynamics = self.course.reference().masses().dynamics(&states);
     }
 
     /// Whether the task has disturbances, which [`Imitate::perturb`] starts.
@@ -233,15 +189,17 @@ impl Imitate {
 
     /// Latest start that leaves something to do, seconds.
     pub fn last_start(&self) -> f64 {
-        self.reference.last_start(self.setting.physics.control_dt())
+        self.course
+            .reference()
+            .last_start(self.setting.physics.control_dt())
     }
 
     /// Steps from here to the end of the motion or the time limit, whichever is nearer.
     pub fn possible_steps(&self) -> f64 {
         let limit = self.setting.episode_s - self.elapsed;
-        let left = match self.reference.loop_mode() {
+        let left = match self.course.reference().loop_mode() {
             LoopMode::Wrap => limit,
-            LoopMode::Clamp => limit.min(self.reference.duration() - self.time()),
+            LoopMode::Clamp => limit.min(self.course.reference().duration() - self.time()),
         };
         (left * self.setting.physics.control_hz - 1e-6)
             .ceil()
@@ -312,8 +270,9 @@ impl Imitate {
 
     /// What the control step that was taken has led to.
     fn judge(&mut self, stepped: Result<(), Diverged>) -> Step {
-        self.elapsed += self.setting.physics.control_dt();
-        self.passed += self.setting.physics.control_dt();
+        let dt = self.setting.physics.control_dt();
+        self.elapsed += dt;
+        self.course.advance(dt);
         if stepped.is_err() {
             return Step {
                 reward: 0.0,
@@ -323,10 +282,10 @@ impl Imitate {
         }
         let states = self.world.states();
         let pressed = self.world.contacts();
-        let links = self.reference.contact_links.iter();
+        let links = self.course.reference().contact_links.iter();
         self.touching.clear();
         self.touching.extend(links.map(|&link| pressed[link]));
-        self.dynamics = self.reference.masses().dynamics(states);
+        self.dynamics = self.course.reference().masses().dynamics(states);
         let terms = terms(
             self.setting.rewards.kernels,
             &self.stage,
@@ -336,7 +295,7 @@ impl Imitate {
         let reward = terms.total(&self.setting.rewards);
         let outcome = self.outcome(reward);
         self.follow();
-        self.change_in_time();
+        self.course.change_in_time();
         self.look_ahead();
         Step {
             reward,
@@ -376,7 +335,7 @@ impl Imitate {
 
     /// Time in the reference, seconds.
     pub fn time(&self) -> f64 {
-        self.transition.time(self.passed)
+        self.course.time()
     }
 
     fn shove(&mut self) {
@@ -393,27 +352,26 @@ impl Imitate {
     /// Where a cycle begins, the reference is moved to the agent; so it is while one motion goes over into another, for
     /// nobody can say beforehand how fast a character gathers speed.
     fn follow(&mut self) {
-        let before = self.passed - self.setting.physics.control_dt();
-        let span = [before, self.passed].map(|passed| self.transition.time(passed));
-        let begins = self.setting.cycles_follow && self.reference.begins_cycle(span);
-        if begins || self.transition.eases(self.passed) {
+        let dt = self.setting.physics.control_dt();
+        let begins = self.setting.cycles_follow && self.course.begins_cycle(dt);
+        if begins || self.course.eases() {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
-            self.transition.shift(apart);
+            self.course.shift(apart);
         }
     }
 
     fn look_ahead(&mut self) {
-        let passed = self.passed + self.setting.physics.control_dt();
         // Taken out for the moment, so that its room is used again.
         let mut next = std::mem::take(&mut self.next);
-        self.wanted_after(passed, &mut next);
+        self.course
+            .sample(self.setting.physics.control_dt(), &mut next);
         self.next = next;
     }
 
     fn outcome(&self, reward: f32) -> Outcome {
         let (states, contacts) = (self.world.states(), self.world.contacts());
-        let allowed = &self.reference.contact_links;
+        let allowed = &self.course.reference().contact_links;
         match failure(
             &self.setting.terminations,
             states,
@@ -423,15 +381,12 @@ impl Imitate {
             reward,
         ) {
             Some(failure) => Outcome::Failed(failure),
-            None if self.reference.is_over(self.time()) => Outcome::Finished,
+            None if self.course.reference().is_over(self.time()) => Outcome::Finished,
             None if self.elapsed >= self.setting.episode_s - 1e-9 => Outcome::TimeLimit,
             None => Outcome::Running,
         }
     }
 }
-
-/// Seconds in which [`Imitate::lead_to`] goes over.
-const WAITS: f64 = 1.0;
 
 /// A body this little above the lowest one stands with it, metres.
 const STANDING: f64 = 0.01;

@@ -5,6 +5,7 @@
 
 mod aim;
 mod blend;
+mod course;
 mod dynamics;
 mod imitate;
 mod observe;

@@ -244,19 +244,27 @@ fn a_motion_is_left_where_the_next_one_is_near() {
         env.reset(told);
         env.lead_to(&kick);
         let action = vec![0.0; env.action_size()];
-        let mut steps = 0;
+        let mut steps = 0_u32;
         while env.is_leading() {
             env.step(&action);
             steps += 1;
         }
         assert!(steps <= 30, "{steps} steps");
         waited += steps;
-        let far = |time: f64| {
-            let mut sample = walk.blank();
-            walk.sample(time, &mut sample);
+        // The walk slows down meanwhile.
+        let mut slowing = Transition::none(told);
+        let mut sample = walk.blank();
+        walk.sample(told, &mut sample);
+        let speed = sample.dynamics.com_velocity.xy().norm();
+        slowing.slow(0.0, speed, kick.speed());
+        let mut far = |steps: u32| {
+            let passed = f64::from(steps) / 30.0;
+            let place = slowing.at(passed);
+            walk.sample_at(&place, slowing.time(passed), &mut sample);
             kick.distance(&sample)
         };
-        assert!(far(told + f64::from(steps) / 30.0) <= far(told) + 1e-6);
+        assert!(far(steps) <= far(0) + 1e-6);
+        assert!(slowing.at(0.9).pace < 0.6, "the kick begins standing");
     }
     assert!(waited > 0);
 }

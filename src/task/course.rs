@@ -1,0 +1,136 @@
+//! What an agent is to follow: a motion, how it is led into, and what comes next.
+
+use super::reference::{Reference, Sample};
+use super::stage::Stage;
+use super::transition::Transition;
+use nalgebra::Vector3;
+use std::sync::Arc;
+
+/// Seconds in which [`Course::lead_to`] goes over.
+const WAITS: f64 = 1.0;
+
+/// A motion at a moment of it.
+pub(super) struct Course {
+    stage: Arc<Stage>,
+    reference: Arc<Reference>,
+    /// What leads into the reference.
+    transition: Transition,
+    /// What the reference goes over into, and when so many seconds have passed of it.
+    upcoming: Option<(f64, Arc<Reference>)>,
+    /// Seconds since this reference began.
+    passed: f64,
+}
+
+impl Course {
+    pub fn new(stage: Arc<Stage>, reference: Arc<Reference>) -> Self {
+        Course {
+            stage,
+            reference,
+            transition: Transition::none(0.0),
+            upcoming: None,
+            passed: 0.0,
+        }
+    }
+
+    /// Begins anew, at `time` seconds of `reference`.
+    pub fn begin(&mut self, reference: &Arc<Reference>, time: f64) {
+        self.reference = reference.clone();
+        self.transition = Transition::none(time);
+        self.upcoming = None;
+        self.passed = 0.0;
+    }
+
+    pub fn reference(&self) -> &Arc<Reference> {
+        &self.reference
+    }
+
+    /// Time in the reference, seconds.
+    pub fn time(&self) -> f64 {
+        self.transition.time(self.passed)
+    }
+
+    /// Writes what is wanted in so many seconds.
+    pub fn sample(&self, ahead: f64, sample: &mut Sample) {
+        let passed = self.passed + ahead;
+        let (place, time) = (self.transition.at(passed), self.transition.time(passed));
+        self.reference.sample_at(&place, time, sample);
+        let character = &self.stage.character;
+        if self.transition.blend(character, passed, &mut sample.links) {
+            sample.dynamics = self.reference.masses().dynamics(&sample.links);
+        }
+    }
+
+    /// Goes over into another `reference` at the step, of `dt` seconds, of the next second at which the present one comes
+    /// nearest to it; at once where the present one ends.
+    pub fn lead_to(&mut self, reference: &Arc<Reference>, dt: f64) {
+        let mut sample = self.reference.blank();
+        self.sample(0.0, &mut sample);
+        let speed = sample.dynamics.com_velocity.xy().norm();
+        self.transition.slow(self.passed, speed, reference.speed());
+        let mut best = (f32::INFINITY, self.passed);
+        for step in 0..(WAITS / dt).round() as u32 {
+            let passed = self.passed + f64::from(step) * dt;
+            let time = self.transition.time(passed);
+            if step > 0 && self.reference.is_over(time) {
+                break;
+            }
+            self.sample(passed - self.passed, &mut sample);
+            let distance = reference.distance(&sample);
+            if distance < best.0 {
+                best = (distance, passed);
+            }
+        }
+        self.upcoming = Some((best.1, reference.clone()));
+        self.change_in_time();
+    }
+
+    /// Whether [`Course::lead_to`] hasn't led to its reference yet.
+    pub fn is_leading(&self) -> bool {
+        self.upcoming.is_some()
+    }
+
+    /// Lets `dt` seconds pass.
+    pub fn advance(&mut self, dt: f64) {
+        self.passed += dt;
+    }
+
+    /// Whether a cycle of a motion that repeats began within the last `dt` seconds.
+    pub fn begins_cycle(&self, dt: f64) -> bool {
+        let before = self.transition.time(self.passed - dt);
+        self.reference.begins_cycle([before, self.time()])
+    }
+
+    /// Whether one motion is still going over into another.
+    pub fn eases(&self) -> bool {
+        self.transition.eases(self.passed)
+    }
+
+    /// Moves the motion on along the ground.
+    pub fn shift(&mut self, by: Vector3<f32>) {
+        self.transition.shift(by);
+    }
+
+    /// Goes over where [`Course::lead_to`] has planned to.
+    pub fn change_in_time(&mut self) {
+        if let Some((passed, _)) = self.upcoming
+            && self.passed >= passed - 1e-9
+            && let Some((_, reference)) = self.upcoming.take()
+        {
+            self.change_to(&reference);
+        }
+    }
+
+    /// Goes on with another `reference`, from the moment of it that is nearest to the present one.
+    pub fn change_to(&mut self, reference: &Arc<Reference>) {
+        let mut present = self.reference.blank();
+        self.sample(0.0, &mut present);
+        let time = reference.nearest(&present);
+        let mut begun = reference.blank();
+        reference.sample(time, &mut begun);
+        let character = &self.stage.character;
+        self.transition = Transition::between(character, &present, &begun, time);
+        self.upcoming = None;
+        self.passed = 0.0;
+        self.reference = reference.clone();
+    }
+}
