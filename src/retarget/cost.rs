@@ -25,8 +25,8 @@ pub(super) mod weight {
     pub const SHIFT_ACCELERATION: f64 = 1e-4;
     /// Joint acceleration, per rad/s².
     pub const TURN_ACCELERATION: f64 = 3e-5;
-    /// What a hinge turns more than it may from a frame to the next, per radian.
-    pub const PACE: f64 = 0.3;
+    /// What a hinge turns faster than it may, per rad/s.
+    pub const PACE: f64 = 0.01;
 }
 
 /// Limits are kept this far inside, so that they hold to the end, radians.

@@ -2,7 +2,7 @@
 
 use super::align::Alignment;
 use super::model::Model;
-use super::pace::Paces;
+use super::pace::{self, Paces, Ways};
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::skeleton::{Skeleton, limits};
@@ -123,6 +123,7 @@ impl Goals {
             paces: Paces::default(),
         };
         let builder = Builder::new(map, alignment, skeleton);
+        let mut ways = Vec::with_capacity(clip.frames.len());
         for f in 0..clip.frames.len() {
             let source = clip.world(f);
             let mut rotations = builder.rotations(&source);
@@ -133,9 +134,10 @@ impl Goals {
             goals.hanging.push(hanging);
             let chosen = turns.iter().map(|(i, _)| rotations[*i]);
             goals.rotations.push(chosen.collect());
+            ways.push(builder.ways(&source, &qpos));
             goals.guess.push(qpos);
         }
-        goals.paces = Paces::new(model, &goals, clip.fps);
+        goals.paces = Paces::new(model, &ways, clip.fps);
         goals
     }
 
@@ -199,6 +201,18 @@ impl<'a> Builder<'a> {
     fn source_point(&self, source: &[Isometry3<f64>], slot: Slot) -> Option<Vector3<f64>> {
         let joint = self.map.joint(slot)?;
         Some(source[joint].translation.vector * self.alignment.scale)
+    }
+
+    /// Where the source's limbs go, seen from the root of a pose.
+    fn ways(&self, source: &[Isometry3<f64>], qpos: &[f64]) -> Ways {
+        let root = super::model::quaternion(qpos, 3);
+        pace::limbs().map(|limb| {
+            let [a, b, c] = limb.map(|slot| self.source_point(source, slot));
+            let way = |from: Option<Vector3<f64>>, to: Option<Vector3<f64>>| {
+                Some(root.inverse() * (to? - from?))
+            };
+            [way(a, b), way(b, c)]
+        })
     }
 
     fn rotations(&self, source: &[Isometry3<f64>]) -> Vec<UnitQuaternion<f64>> {

@@ -1,7 +1,7 @@
 //! How fast hinges may turn. A limb of hinges reaches a place in more ways than one, and each way ends at its limits: where
 //! another becomes the better one, nothing but this keeps the limb from being there in the next frame.
 
-use super::goals::{ARMS, Goals, LEGS};
+use super::goals::{ARMS, LEGS};
 use super::model::Model;
 use crate::humanoid::Slot;
 use crate::skeleton::JointKind;
@@ -13,6 +13,15 @@ const ALWAYS: f64 = 6.0;
 /// And by this much more than the source turns the two parts of the limb.
 const MORE: f64 = 1.5;
 
+/// Where the upper and the lower parts of arms and legs go in the source, seen from its root, as far as they are known; in
+/// the order of [`limbs`].
+pub(super) type Ways = [[Option<Vector3<f64>>; 2]; 4];
+
+/// Arms and legs.
+pub(super) fn limbs() -> [[Slot; 3]; 4] {
+    [ARMS[0], ARMS[1], LEGS[0], LEGS[1]]
+}
+
 /// Most that hinges may turn from a frame to the next.
 #[derive(Clone, Default)]
 pub(super) struct Paces {
@@ -23,25 +32,25 @@ pub(super) struct Paces {
 }
 
 impl Paces {
-    pub fn new(model: &Model, goals: &Goals, fps: f64) -> Paces {
-        let limbs = ARMS.iter().chain(&LEGS);
-        let limbs = limbs.map(|limb| (limb, hinges(model, limb)));
-        let limbs: Vec<_> = limbs.filter(|(_, hinges)| !hinges.is_empty()).collect();
-        let mut paces = Paces {
-            hinges: limbs.iter().flat_map(|(_, h)| h).copied().collect(),
-            most: Vec::new(),
-        };
-        if paces.hinges.is_empty() {
-            return paces;
+    /// For a source whose limbs go those ways, frame after frame.
+    pub fn new(model: &Model, ways: &[Ways], fps: f64) -> Paces {
+        let own = limbs().map(|limb| hinges(model, &limb));
+        if own.iter().all(Vec::is_empty) {
+            return Paces::default();
         }
-        for f in 0..goals.frames() {
-            let most = limbs.iter().flat_map(|(limb, hinges)| {
-                let most = ALWAYS / fps + MORE * turned(model, goals, limb, f);
+        let most = |f: usize| {
+            let next = ways.get(f + 1).unwrap_or(&ways[f]);
+            let limbs = own.iter().zip(ways[f].iter().zip(next));
+            let most = limbs.flat_map(|(hinges, (way, next))| {
+                let most = ALWAYS / fps + MORE * turned(way, next);
                 hinges.iter().map(move |_| most)
             });
-            paces.most.push(most.collect());
+            most.collect()
+        };
+        Paces {
+            most: (0..ways.len()).map(most).collect(),
+            hinges: own.concat(),
         }
-        paces
     }
 
     /// Leaves the frames `own`.
@@ -77,18 +86,57 @@ fn hinges(model: &Model, [upper, lower, _]: &[Slot; 3]) -> Vec<usize> {
     if hinges.len() > 1 { hinges } else { Vec::new() }
 }
 
-/// By how much the goals turn the parts of a limb from frame `f` to the next, seen from the root, radians.
-fn turned(model: &Model, goals: &Goals, limb: &[Slot; 3], f: usize) -> f64 {
-    let next = (f + 1).min(goals.frames() - 1);
-    let at = |slot: &Slot, f: usize| {
-        let body = model.skeleton.slots.get(slot)?;
-        let key = goals.keys.iter().position(|key| key.body == *body)?;
-        Some(goals.root_rotation(f).inverse() * goals.points[f][key])
+/// By how much the parts of a limb turn, radians.
+fn turned(way: &[Option<Vector3<f64>>; 2], next: &[Option<Vector3<f64>>; 2]) -> f64 {
+    let parts = way.iter().zip(next);
+    let angle = |(a, b): (&Option<Vector3<f64>>, &Option<Vector3<f64>>)| {
+        Some(a.as_ref()?.angle(b.as_ref()?))
     };
-    let part = |a: &Slot, b: &Slot| {
-        let way = |f: usize| -> Option<Vector3<f64>> { Some(at(b, f)? - at(a, f)?) };
-        Some(way(f)?.angle(&way(next)?))
-    };
-    let [upper, lower, end] = limb;
-    part(upper, lower).unwrap_or(0.0) + part(lower, end).unwrap_or(0.0)
+    parts.filter_map(angle).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::skeleton::Skeleton;
+
+    /// A left thigh that swings by 0.2 rad a frame, and a shin that doesn't turn.
+    #[test]
+    fn hinges_may_turn_as_their_limb_does_and_more() {
+        let skeleton = Skeleton::load("marathon").expect("a built-in character");
+        let model = Model::new(&skeleton);
+        let swung = |f: usize| {
+            let (sin, cos) = (0.2 * f as f64).sin_cos();
+            let mut ways = Ways::default();
+            ways[2] = [Some(Vector3::new(sin, 0.0, -cos)), Some(-Vector3::z())];
+            ways
+        };
+        let ways: Vec<Ways> = (0..4).map(swung).collect();
+        let paces = Paces::new(&model, &ways, 30.0);
+        let name = |dof: usize| {
+            let mut joints = model.joints();
+            joints
+                .find(|joint| joint.dof == dof)
+                .expect("a joint")
+                .name
+                .clone()
+        };
+        let mut seen = 0;
+        for (dof, most) in paces.of(1) {
+            let leg = ["left_hip", "left_knee"]
+                .iter()
+                .any(|n| name(dof).starts_with(n));
+            let expected = if leg {
+                6.0 / 30.0 + 1.5 * 0.2
+            } else {
+                6.0 / 30.0
+            };
+            assert!((most - expected).abs() < 1e-9, "{}: {most}", name(dof));
+            seen += usize::from(leg);
+        }
+        assert!(seen > 1, "a hip of hinges and a knee");
+        let humanoid = Skeleton::load("humanoid").expect("a built-in character");
+        let none = Paces::new(&Model::new(&humanoid), &ways, 30.0);
+        assert_eq!(none.of(1).count(), 0, "one hinge bends in one way");
+    }
 }

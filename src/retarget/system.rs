@@ -172,7 +172,7 @@ impl System {
     /// Penalty on hinges that turn faster than they may in the step `out` of frame `f`, which stands at `place`.
     fn paces(&mut self, problem: &Problem, out: &[f64], f: usize, place: i64) -> f64 {
         let at = [place, place + 1].map(|p| self.window.inside(p));
-        let square = weight::PACE * weight::PACE;
+        let square = (weight::PACE * problem.fps).powi(2);
         let mut cost = 0.0;
         for (dof, most) in problem.goals.paces.of(f) {
             let excess = out[dof] - out[dof].clamp(-most, most);

@@ -3,6 +3,7 @@
 use super::reference::{Reference, Sample};
 use super::stage::Stage;
 use super::transition::Transition;
+use crate::clip::LoopMode;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ pub(super) struct Course {
     reference: Arc<Reference>,
     /// What leads into the reference.
     transition: Transition,
-    /// What the reference goes over into, and when so many seconds have passed of it.
+    /// What the reference goes over into, and how many seconds after this one began.
     upcoming: Option<(f64, Arc<Reference>)>,
     /// Seconds since this reference began.
     passed: f64,
@@ -46,13 +47,27 @@ impl Course {
 
     /// Time in the reference, seconds.
     pub fn time(&self) -> f64 {
-        self.transition.time(self.passed)
+        self.transition.clock().time(self.passed)
+    }
+
+    /// Seconds until the reference ends, if it does.
+    pub fn left(&self) -> f64 {
+        match self.reference.loop_mode() {
+            LoopMode::Wrap => f64::INFINITY,
+            LoopMode::Clamp => {
+                let end = self.reference.duration();
+                self.transition.clock().until(end, self.passed)
+            }
+        }
     }
 
     /// Writes what is wanted in so many seconds.
     pub fn sample(&self, ahead: f64, sample: &mut Sample) {
         let passed = self.passed + ahead;
-        let (place, time) = (self.transition.at(passed), self.transition.time(passed));
+        let (place, time) = (
+            self.transition.at(passed),
+            self.transition.clock().time(passed),
+        );
         self.reference.sample_at(&place, time, sample);
         let character = &self.stage.character;
         if self.transition.blend(character, passed, &mut sample.links) {
@@ -60,17 +75,20 @@ impl Course {
         }
     }
 
-    /// Goes over into another `reference` at the step, of `dt` seconds, of the next second at which the present one comes
+    /// Slows down for another `reference`, if that is slower, and goes over into it at the step, of `dt` seconds, of the next second at which the present one comes
     /// nearest to it; at once where the present one ends.
     pub fn lead_to(&mut self, reference: &Arc<Reference>, dt: f64) {
         let mut sample = self.reference.blank();
         self.sample(0.0, &mut sample);
-        let speed = sample.dynamics.com_velocity.xy().norm();
-        self.transition.slow(self.passed, speed, reference.speed());
+        let speed = ground_speed(&sample);
+        let mut entry = reference.blank();
+        reference.sample(reference.nearest(&sample), &mut entry);
+        self.transition
+            .slow(self.passed, speed, ground_speed(&entry));
         let mut best = (f32::INFINITY, self.passed);
         for step in 0..(WAITS / dt).round() as u32 {
             let passed = self.passed + f64::from(step) * dt;
-            let time = self.transition.time(passed);
+            let time = self.transition.clock().time(passed);
             if step > 0 && self.reference.is_over(time) {
                 break;
             }
@@ -96,7 +114,7 @@ impl Course {
 
     /// Whether a cycle of a motion that repeats began within the last `dt` seconds.
     pub fn begins_cycle(&self, dt: f64) -> bool {
-        let before = self.transition.time(self.passed - dt);
+        let before = self.transition.clock().time(self.passed - dt);
         self.reference.begins_cycle([before, self.time()])
     }
 
@@ -133,4 +151,9 @@ impl Course {
         self.passed = 0.0;
         self.reference = reference.clone();
     }
+}
+
+/// Speed of the centre of mass along the ground, m/s.
+fn ground_speed(sample: &Sample) -> f32 {
+    sample.dynamics.com_velocity.xy().norm()
 }

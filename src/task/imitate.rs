@@ -9,7 +9,6 @@ use super::reward::{Terms, terms};
 use super::setting::Setting;
 use super::stage::Stage;
 use super::terminate::{Failure, failure};
-use crate::clip::LoopMode;
 use crate::sim::{Diverged, LinkState, Target, World};
 use crate::task::Dynamics;
 use std::sync::Arc;
@@ -89,7 +88,8 @@ impl Imitate {
         self.begin(reference, time);
     }
 
-    /// Goes over into another `reference`, as by [`Imitate::change_to`], at the control step of the next second at which
+    /// Slows the present reference down for another `reference`, if that is slower, and goes over into it, as by
+    /// [`Imitate::change_to`], at the control step of the next second at which
     /// the present one comes nearest to it; at once where the present one ends.
     pub fn lead_to(&mut self, reference: &Arc<Reference>) {
         self.course
@@ -197,10 +197,7 @@ impl Imitate {
     /// Steps from here to the end of the motion or the time limit, whichever is nearer.
     pub fn possible_steps(&self) -> f64 {
         let limit = self.setting.episode_s - self.elapsed;
-        let left = match self.course.reference().loop_mode() {
-            LoopMode::Wrap => limit,
-            LoopMode::Clamp => limit.min(self.course.reference().duration() - self.time()),
-        };
+        let left = limit.min(self.course.left());
         (left * self.setting.physics.control_hz - 1e-6)
             .ceil()
             .max(1.0)

@@ -5,6 +5,7 @@
 
 mod aim;
 mod blend;
+mod clock;
 mod course;
 mod dynamics;
 mod imitate;

@@ -119,14 +119,6 @@ impl Reference {
         after > before
     }
 
-    /// Mean speed along the ground, m/s, of a motion that repeats; one that ends is taken to begin standing.
-    pub fn speed(&self) -> f32 {
-        match self.loop_mode {
-            LoopMode::Wrap => (self.cycle.translation.xy().norm() / self.duration) as f32,
-            LoopMode::Clamp => 0.0,
-        }
-    }
-
     /// Largest angular momentum of all frames, kg·m²/s.
     pub fn largest_momentum(&self) -> f32 {
         let momentum = |links: &Vec<LinkState>| self.masses.dynamics(links).angular_momentum.norm();

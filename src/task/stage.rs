@@ -31,7 +31,7 @@ pub struct Stage {
     pub chest_body: Option<usize>,
     /// Heel, left of the toes, right of the toes, of each foot.
     pub soles: Vec<SolePoint>,
-    /// What each link's joint counts for where joints are weighted; their sum is one.
+    /// What each link counts for where joints are weighted: all joints together one.
     pub joint_weights: Vec<f32>,
     /// What divides angular momentum: mass × leg length × √(g × leg length), kg·m²/s.
     pub momentum_scale: f32,

@@ -1,17 +1,11 @@
 //! How one motion goes over into another.
 
 use super::blend::Blend;
+use super::clock::{Clock, EASES, left};
 use super::reference::{Sample, anchor, moved};
 use crate::sim::{Character, LinkState};
 use nalgebra::{Isometry3, Translation3, Vector3};
 
-/// Seconds in which the speed of the one becomes that of the other.
-const EASES: f64 = 1.0;
-/// Seconds in which a motion that is to be left slows down.
-const SLOWS: f64 = 1.0;
-/// Slowest and fastest pace at which a motion begins, of its own: half a run is a quick walk, and more than half as fast
-/// again asks for forces that it was never seen with.
-const PACES: [f32; 2] = [0.5, 1.5];
 /// A motion that goes slower than this stands, and no pace makes it go, m/s.
 const STANDS: f32 = 0.5;
 
@@ -22,7 +16,7 @@ pub struct Placement {
     pub pose: Isometry3<f32>,
     /// What it slides at besides, m/s, world axes.
     pub velocity: Vector3<f32>,
-    /// How much faster time goes in it.
+    /// Seconds of the motion in a second.
     pub pace: f32,
 }
 
@@ -48,15 +42,10 @@ impl Placement {
 #[derive(Clone, Debug)]
 pub(super) struct Transition {
     place: Isometry3<f32>,
-    /// Where the motion begins, seconds of it.
-    begins: f64,
-    /// The pace at which it begins, of its own.
-    pace: f32,
-    /// How much faster the one before was than it is at that pace, m/s, along the ground.
+    clock: Clock,
+    /// How much faster the one before was than it is at the pace at which it begins, m/s, along the ground.
     surplus: Vector3<f32>,
     blend: Option<Blend>,
-    /// From when on, seconds passed, and to which pace it slows down before it is left.
-    slows: Option<(f64, f64)>,
 }
 
 impl Transition {
@@ -64,11 +53,9 @@ impl Transition {
     pub fn none(time: f64) -> Self {
         Self {
             place: Isometry3::identity(),
-            begins: time,
-            pace: 1.0,
+            clock: Clock::new(time, 1.0),
             surplus: Vector3::zeros(),
             blend: None,
-            slows: None,
         }
     }
 
@@ -78,14 +65,12 @@ impl Transition {
         let along = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
         let speed = along(present.dynamics.com_velocity);
         let own = along(place.rotation * begun.dynamics.com_velocity);
-        let pace = pace(&speed, &own);
+        let clock = Clock::new(time, f64::from(pace(&speed, &own)));
         let mut transition = Self {
             place,
-            begins: time,
-            pace,
-            surplus: speed - own * pace,
+            clock,
+            surplus: speed - own * clock.pace(0.0) as f32,
             blend: None,
-            slows: None,
         };
         let begins = transition.at(0.0);
         let mut links = begun.links.clone();
@@ -94,35 +79,17 @@ impl Transition {
         transition
     }
 
-    /// From so many seconds `passed` on, a motion at `speed`, m/s, slows down evenly for one at another speed, but to no less
-    /// than half its pace.
+    /// How time goes in the motion.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// From so many seconds `passed` on, a motion at `speed`, m/s, slows down for one at another speed.
     pub fn slow(&mut self, passed: f64, speed: f32, other: f32) {
-        if speed > other.max(STANDS) {
-            self.slows = Some((passed, f64::from((other / speed).max(PACES[0]))));
-        }
-    }
-
-    /// Seconds of the motion when so many have `passed`. With p the pace and τ the share of [`EASES`] that has passed, it
-    /// runs at 1 + (p − 1) (1 − τ)², and so has gained (p − 1) E/3 (1 − (1 − τ)³); with q the pace to which it slows down
-    /// and σ the share of [`SLOWS`] that has passed of that, at (q − 1) σ more, and has gained (q − 1) S (σ²/2, or σ − 1/2
-    /// beyond).
-    pub fn time(&self, passed: f64) -> f64 {
-        let entered = f64::from(self.pace - 1.0) * EASES / 3.0 * (1.0 - left(passed).powi(3));
-        let slowed = self.slows.map_or(0.0, |(since, pace)| {
-            let share = ((passed - since) / SLOWS).max(0.0);
-            let within = share.min(1.0);
-            (pace - 1.0) * SLOWS * (within * within / 2.0 + (share - within))
-        });
-        self.begins + passed + entered + slowed
-    }
-
-    /// How fast time goes in the motion when so many seconds have `passed`.
-    fn pace_after(&self, passed: f64) -> f32 {
-        let entering = (self.pace - 1.0) * left(passed).powi(2) as f32;
-        let slowing = self.slows.map_or(0.0, |(since, pace)| {
-            (pace - 1.0) * ((passed - since) / SLOWS).clamp(0.0, 1.0)
-        });
-        1.0 + entering + slowing as f32
+        // The speed at its own pace, and no pace makes a motion go that stands.
+        let own = speed / self.clock.pace(passed) as f32;
+        let pace = if own > STANDS { other / own } else { 1.0 };
+        self.clock.slow(passed, f64::from(pace));
     }
 
     /// Adds to the links of the motion as they are when so many seconds have `passed`, where it is performed, what is left
@@ -154,21 +121,19 @@ impl Transition {
         Placement {
             pose: Translation3::from(way) * self.place,
             velocity: self.surplus * (left * left),
-            pace: self.pace_after(passed),
+            pace: self.clock.pace(passed) as f32,
         }
     }
 }
 
-/// The share of [`EASES`] that is left.
-fn left(passed: f64) -> f64 {
-    (1.0 - passed / EASES).clamp(0.0, 1.0)
-}
-
-/// The pace at which a motion at its `own` velocity is as fast as the one before it in that direction.
+/// The pace at which a motion at its `own` velocity is as fast as the one before it; the slowest if it goes the other way.
 fn pace(speed: &Vector3<f32>, own: &Vector3<f32>) -> f32 {
     let fast = own.norm();
     if fast < STANDS {
         return 1.0;
     }
-    (speed.dot(own) / (fast * fast)).clamp(PACES[0], PACES[1])
+    if speed.dot(own) < 0.0 {
+        return 0.0;
+    }
+    speed.norm() / fast
 }

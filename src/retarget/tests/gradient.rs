@@ -2,7 +2,7 @@
 
 use super::super::cost::Problem;
 use super::super::goals::{Key, Turn};
-use super::super::pace::Paces;
+use super::super::pace::{Paces, Ways};
 use super::super::solve::Solver;
 use super::super::stance::Anchor;
 use super::super::system::Window;
@@ -57,7 +57,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
         hanging: Vec::new(),
         paces: Paces::default(),
     };
-    goals.paces = Paces::new(&model, &goals, 30.0);
+    goals.paces = Paces::new(&model, &vec![Ways::default(); count], 30.0);
     let anchor = |knob| Anchor {
         knob,
         at: Vector3::new(0.1, 0.2, 0.0),

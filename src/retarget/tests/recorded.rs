@@ -151,9 +151,8 @@ fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
     assert_good(&done.report, 0.012, 0.02);
 }
 
-/// In the midst of a cartwheel only hands are down: the feet are no ground to stand on.
 /// Arms of two hinges and an elbow reach backward in one way and forward in another: from a frame to the next they were
-/// 2.6 rad apart.
+/// 2.6 rad apart, at 77 rad/s.
 #[test]
 fn hinges_go_from_one_way_of_bending_to_another_as_fast_as_limbs_turn() {
     let Some(clip) = clip("cmu/91_50.fbx", None) else {
@@ -165,10 +164,12 @@ fn hinges_go_from_one_way_of_bending_to_another_as_fast_as_limbs_turn() {
     for (f, pair) in motion.qpos.windows(2).enumerate() {
         let steps = pair[0][7..].iter().zip(&pair[1][7..]);
         let most = steps.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(most < 1.0, "{most} rad after frame {f}");
+        let rate = most * motion.fps;
+        assert!(rate < 30.0, "{rate} rad/s after frame {f}");
     }
 }
 
+/// In the midst of a cartwheel only hands are down: the feet are no ground to stand on.
 #[test]
 fn a_part_in_which_no_foot_comes_down_keeps_its_height() {
     let options = import::Options {

@@ -11,7 +11,7 @@ use crate::task::{Dynamics, Stage};
 use nalgebra::Vector3;
 
 /// pose exp(−2 Σ wⱼ‖q̂ ⊖ q‖²) and velocity exp(−0.1 Σ wⱼ‖ω̂ − ω‖²) over joints with [`joint_weights`], the root's rotation
-/// among them; end effectors exp(−40 mean‖p̂ − p‖²) over hands and feet as seen from the root, but for their height; root
+/// among them, its rate along the world's axes; end effectors exp(−40 mean‖p̂ − p‖²) over hands and feet as seen from the root, but for their height; root
 /// exp(−5 (‖Δp‖² + 0.1 Δθ² + 0.01 ‖Δv‖² + 0.001 ‖Δω‖²)); centre of mass exp(−‖Δv‖²).
 pub(super) fn terms(
     stage: &Stage,
@@ -20,7 +20,10 @@ pub(super) fn terms(
 ) -> Terms {
     let (mut pose, mut velocity) = (0.0, 0.0);
     for (i, weight) in stage.joint_weights.iter().enumerate() {
-        let rate = joint_rate(stage, links, i) - joint_rate(stage, wanted, i);
+        let rate = match i {
+            0 => links[0].angular - wanted[0].angular,
+            _ => joint_rate(stage, links, i) - joint_rate(stage, wanted, i),
+        };
         pose += weight * joint_error(stage, links, wanted, i);
         velocity += weight * rate.norm_squared();
     }
@@ -51,17 +54,26 @@ fn seen(stage: &Stage, links: &[LinkState], end: usize) -> Vector3<f32> {
     heading(&root.rotation).inverse() * (at - below)
 }
 
-/// What each link's joint weighs in the program, of a sum of one: root 1, hips and trunk 0.5, knees, shoulders and neck 0.3,
-/// ankles and elbows 0.2, before they are divided by their sum. Wrists have 0 there, and toes, which its character hasn't.
+/// What each link's joint weighs in the program: root 1, hips and trunk 0.5, knees, shoulders and neck 0.3, ankles and elbows
+/// 0.2, over their sum; wrists 0, and toes, which its character hasn't. Where several links make up a joint, one for each
+/// motor, those above count as the one that has the slot.
 pub(crate) fn joint_weights(skeleton: &Skeleton, character: &Character) -> Vec<f32> {
-    let mut weights = vec![0.0_f32; character.links.len()];
+    let mut slotted: Vec<Option<f32>> = vec![None; character.links.len()];
     for (slot, body) in &skeleton.slots {
-        let link = character.bodies[*body].0;
-        weights[link] = weights[link].max(weight(*slot));
+        let weighs = &mut slotted[character.bodies[*body].0];
+        *weighs = Some(weighs.unwrap_or(0.0).max(weight(*slot)));
     }
-    weights[0] = 1.0;
-    let sum: f32 = weights.iter().sum();
-    weights.iter().map(|weight| weight / sum).collect()
+    slotted[0] = Some(weight(Slot::Hips));
+    let sum: f32 = slotted.iter().flatten().sum();
+    let mut below = vec![0.0_f32; character.links.len()];
+    // Parents stand before their children.
+    for (i, link) in character.links.iter().enumerate().rev() {
+        below[i] = slotted[i].unwrap_or(below[i]);
+        if let Some(parent) = link.parent {
+            below[parent] = below[parent].max(below[i]);
+        }
+    }
+    below.iter().map(|weight| weight / sum).collect()
 }
 
 fn weight(slot: Slot) -> f32 {

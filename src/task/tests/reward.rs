@@ -2,9 +2,10 @@
 
 use super::{sample, stage};
 use crate::sim::LinkState;
+use crate::skeleton::Skeleton;
 use crate::task::dynamics::Masses;
 use crate::task::reward::terms;
-use crate::task::{Kernels, Rewards, Setting, TERM_NAMES, Terms};
+use crate::task::{Kernels, Rewards, Setting, Stage, TERM_NAMES, Terms};
 use nalgebra::{UnitQuaternion, Vector3};
 
 fn close(found: f32, expected: f64, what: &str) {
@@ -105,6 +106,17 @@ fn a_shift_costs_the_root_and_heights_in_the_program() {
     close(terms.pose * terms.velocity * terms.com, 1.0, "the rest");
     let weights: f32 = stage().joint_weights.iter().sum();
     close(weights, 1.0, "all joints");
+    // A hip of three motors counts with each of them.
+    let robot = Skeleton::load("robot").expect("a built-in character");
+    let robot = Stage::new(robot).expect("it can be simulated");
+    let weighs = |name: &str| {
+        let link = robot.character.links.iter().position(|l| l.name == name);
+        robot.joint_weights[link.expect("a link of that name")]
+    };
+    let thigh = weighs("left_thigh");
+    assert!(thigh > 0.05, "{thigh}");
+    assert_eq!(weighs("left_hip_pitch_link"), thigh);
+    assert_eq!(weighs("left_hip_roll_link"), thigh);
 }
 
 /// A head turned by θ and turning at ω: one joint of the sums.
