@@ -315,7 +315,7 @@ fn a_published_preset_trains_on_its_character() {
         "ppo.minibatch=64",
     ];
     for (preset, skeleton, observation, kernels) in [
-        ("deepmimic", "humanoid", 167, "deepmimic"),
+        ("deepmimic", "humanoid", 167, "deepmimic-program"),
         ("deepmimic2018", "humanoid", 227, "deepmimic"),
         ("booth2020", "marathon", 258, "booth2020"),
     ] {
@@ -326,7 +326,7 @@ fn a_published_preset_trains_on_its_character() {
         let output = bench.mimic(&line).assert().success();
         let terms = lines(&output.get_output().stdout)[0]["reward_terms"].clone();
         assert!(terms["end_effector"].as_f64() > Some(0.0), "{terms}");
-        assert_eq!(terms.get("root"), None, "no term of other kernels");
+        assert_eq!(terms.get("position"), None, "no term of other kernels");
         let text = std::fs::read_to_string(bench.path(preset).join("config.json"));
         let config: Value = serde_json::from_str(&text.expect("a config")).expect("is JSON");
         assert_eq!(config["skeleton"], skeleton);
