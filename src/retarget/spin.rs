@@ -1,7 +1,8 @@
 //! Flights spin freely: while nothing touches the ground, the angular momentum about the centre of mass stays.
 //!
-//! The body is turned as it is, as a whole and about its centre of mass, by a rotation δ with
-//! I(t) δ̇ = L̄ − L(t) that is none at both ends of the flight: so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L.
+//! The body is turned as it is, as a whole and about its centre of mass, by a rotation δ that gives it the same momentum L̄
+//! in every step and is none at both ends of the flight. For small turns I(t) δ̇ = L̄ − L(t), so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L; from
+//! there L̄ is found by shooting: what δ is at the end tells how far L̄ is off.
 
 use super::flight::{Air, Flight, share};
 use super::goals::Goals;
@@ -11,10 +12,13 @@ use crate::clip::{Problem, Severity};
 use crate::skeleton::{Skeleton, Twist};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-/// Rotations don't add up as vectors do; with turns as small as these, each pass leaves a small part of the error.
-const PASSES: usize = 3;
+/// Most shots at the momentum of a flight, and most corrections of the turn of a step.
+const SHOTS: usize = 24;
+const CORRECTIONS: usize = 16;
+/// What may be left of a turn, radians.
+const LEFT: f64 = 1e-6;
 /// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
-const FARTHEST: f64 = 0.5;
+const FARTHEST: f64 = 1.0;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -81,24 +85,64 @@ fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(
 
 /// The turns of a flight, from the last frame on the ground to the first after it.
 fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<UnitQuaternion<f64>>> {
-    let mut turns = vec![UnitQuaternion::identity(); frames.len()];
-    for _ in 0..PASSES {
-        let mut turned = frames.to_vec();
-        let pairs = turned.iter_mut().zip(&turns);
-        pairs.for_each(|(qpos, by)| turn(skeleton, qpos, by));
-        let steps = turned.windows(2).map(|pair| step(skeleton, pair, fps));
-        let steps: Vec<Step> = steps.collect::<Option<_>>()?;
-        let ease: Matrix3<f64> = steps.iter().map(|s| s.inverse_inertia).sum();
-        let spun: Vector3<f64> = steps.iter().map(|s| s.inverse_inertia * s.momentum).sum();
-        let kept = ease.try_inverse()? * spun;
-        let mut angle = Vector3::zeros();
-        for (step, turn) in steps.iter().zip(&mut turns[1..]) {
-            angle += step.inverse_inertia * (kept - step.momentum) / fps;
-            *turn = UnitQuaternion::from_scaled_axis(angle) * *turn;
+    let steps = frames.windows(2).map(|pair| step(skeleton, pair, fps));
+    let steps: Vec<Step> = steps.collect::<Option<_>>()?;
+    let ease: Matrix3<f64> = steps.iter().map(|s| s.inverse_inertia).sum();
+    let spun: Vector3<f64> = steps.iter().map(|s| s.inverse_inertia * s.momentum).sum();
+    // By how much the momentum is off for a turn that is left; learned on the way (Broyden 1965).
+    let mut stiff = ease.try_inverse()?;
+    let mut kept = stiff * spun;
+    stiff *= fps;
+    let mut before: Option<(Vector3<f64>, Vector3<f64>)> = None;
+    for _ in 0..SHOTS {
+        let mut turns = spinning(skeleton, frames, fps, &kept)?;
+        let off = turns.last()?.scaled_axis();
+        if off.norm() < LEFT {
+            *turns.last_mut()? = UnitQuaternion::identity();
+            let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
+            return (farthest <= FARTHEST).then_some(turns);
         }
+        if let Some((then, was_off)) = before {
+            let (by, gave) = (kept - then, off - was_off);
+            let expected = stiff * gave;
+            let along = by.transpose() * stiff;
+            let scale = (along * gave)[0];
+            if scale.abs() > f64::MIN_POSITIVE {
+                stiff += (by - expected) * along / scale;
+            }
+        }
+        before = Some((kept, off));
+        kept -= stiff * off;
     }
-    let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
-    (farthest <= FARTHEST).then_some(turns)
+    None
+}
+
+/// The turns with which the frames keep a momentum, from none on.
+fn spinning(
+    skeleton: &Skeleton,
+    frames: &[Vec<f64>],
+    fps: f64,
+    kept: &Vector3<f64>,
+) -> Option<Vec<UnitQuaternion<f64>>> {
+    let mut turns = vec![UnitQuaternion::identity()];
+    for pair in frames.windows(2) {
+        let mut by = *turns.last()?;
+        let mut pair = pair.to_vec();
+        turn(skeleton, &mut pair[0], &by);
+        let next = pair[1].clone();
+        for _ in 0..CORRECTIONS {
+            pair[1].clone_from(&next);
+            turn(skeleton, &mut pair[1], &by);
+            let step = step(skeleton, &pair, fps)?;
+            let more = step.inverse_inertia * (kept - step.momentum) / fps;
+            by = UnitQuaternion::from_scaled_axis(more) * by;
+            if more.norm() < LEFT / 10.0 {
+                break;
+            }
+        }
+        turns.push(by);
+    }
+    Some(turns)
 }
 
 fn step(skeleton: &Skeleton, pair: &[Vec<f64>], fps: f64) -> Option<Step> {
@@ -195,6 +239,37 @@ mod tests {
             qpos
         };
         (-GATHERS..FLIES + GATHERS + 1).map(frame).collect()
+    }
+
+    /// A somersault of 16 frames a second that turns in its midst and hardly at its ends, with an arm to one side.
+    #[test]
+    fn a_somersault_is_turned_far_and_spins_evenly() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+        let arm = skeleton.bodies.iter().find(|b| b.name == "right_upper_arm");
+        let at = arm.expect("an arm").joints[0].qpos;
+        let frame = |f: i64| {
+            let u = f as f64 / 9.0;
+            let mut qpos = skeleton.rest_qpos();
+            let angle = 0.7 * (std::f64::consts::TAU * u).sin() - 3.5 * u;
+            let root = UnitQuaternion::from_euler_angles(0.0, angle, 0.0);
+            put_quaternion(&mut qpos, 3, &root);
+            let aside = UnitQuaternion::from_euler_angles(-1.2, -u, 0.0);
+            put_quaternion(&mut qpos, at, &aside);
+            qpos
+        };
+        let mut frames: Vec<Vec<f64>> = (0..10).map(frame).collect();
+        let turns = freely(&skeleton, &frames, 16.0).expect("turns");
+        let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
+        assert!((0.5..1.0).contains(&farthest), "{farthest} rad");
+        assert!(turns[9].angle() < 1e-9 && turns[0].angle() < 1e-9);
+        let pairs = frames.iter_mut().zip(&turns);
+        pairs.for_each(|(qpos, by)| turn(&skeleton, qpos, by));
+        let steps = frames.windows(2).map(|pair| step(&skeleton, pair, 16.0));
+        let momenta: Vec<_> = steps.map(|s| s.expect("a step").momentum).collect();
+        for momentum in &momenta {
+            let off = (momentum - momenta[0]).norm() / momenta[0].norm();
+            assert!(off < 1e-4, "{off}");
+        }
     }
 
     #[test]
