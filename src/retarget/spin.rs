@@ -2,7 +2,7 @@
 //!
 //! The body is turned as it is, as a whole and about its centre of mass, by a rotation δ that gives it the same momentum L̄
 //! in every step and is none at both ends of the flight. For small turns I(t) δ̇ = L̄ − L(t), so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L; from
-//! there L̄ is found by shooting: what δ is at the end tells how far L̄ is off.
+//! there L̄ is found by shooting: what δ is at the end tells how far L̄ is off (Newton's method).
 
 use super::flight::{Air, Flight, share};
 use super::goals::Goals;
@@ -12,11 +12,13 @@ use crate::clip::{Problem, Severity};
 use crate::skeleton::{Skeleton, Twist};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-/// Most shots at the momentum of a flight, and most corrections of the turn of a step.
-const SHOTS: usize = 24;
+/// Most corrections of the momentum of a flight, and of the turn of a step.
+const SHOTS: usize = 8;
 const CORRECTIONS: usize = 16;
-/// What may be left of a turn, radians.
-const LEFT: f64 = 1e-6;
+/// What may be left of the turn at the end of a flight, and of a step's correction, radians.
+const LEFT: [f64; 2] = [1e-5, 1e-7];
+/// Share of the momentum by which it is varied to see what that gives.
+const VARIED: f64 = 1e-3;
 /// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
 const FARTHEST: f64 = 1.0;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
@@ -89,30 +91,32 @@ fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<Unit
     let steps: Vec<Step> = steps.collect::<Option<_>>()?;
     let ease: Matrix3<f64> = steps.iter().map(|s| s.inverse_inertia).sum();
     let spun: Vector3<f64> = steps.iter().map(|s| s.inverse_inertia * s.momentum).sum();
-    // By how much the momentum is off for a turn that is left; learned on the way (Broyden 1965).
-    let mut stiff = ease.try_inverse()?;
-    let mut kept = stiff * spun;
-    stiff *= fps;
-    let mut before: Option<(Vector3<f64>, Vector3<f64>)> = None;
-    for _ in 0..SHOTS {
-        let mut turns = spinning(skeleton, frames, fps, &kept)?;
+    let mut kept = ease.try_inverse()? * spun;
+    let shot = |kept: &Vector3<f64>| {
+        let turns = spinning(skeleton, frames, fps, kept)?;
         let off = turns.last()?.scaled_axis();
-        if off.norm() < LEFT {
+        Some((turns, off))
+    };
+    let (mut turns, mut off) = shot(&kept)?;
+    for _ in 0..SHOTS {
+        if off.norm() < LEFT[0] {
             *turns.last_mut()? = UnitQuaternion::identity();
             let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
             return (farthest <= FARTHEST).then_some(turns);
         }
-        if let Some((then, was_off)) = before {
-            let (by, gave) = (kept - then, off - was_off);
-            let expected = stiff * gave;
-            let along = by.transpose() * stiff;
-            let scale = (along * gave)[0];
-            if scale.abs() > f64::MIN_POSITIVE {
-                stiff += (by - expected) * along / scale;
-            }
+        let by = VARIED * kept.norm().max(1.0);
+        let mut slope = Matrix3::zeros();
+        for i in 0..3 {
+            let (_, varied) = shot(&(kept + Vector3::ith(i, by)))?;
+            slope.set_column(i, &((varied - off) / by));
         }
-        before = Some((kept, off));
-        kept -= stiff * off;
+        let step = slope.try_inverse()? * off;
+        // A whole step may lead too far: the better one of a whole and a half.
+        let (near, far) = (kept - step / 2.0, kept - step);
+        (kept, (turns, off)) = match (shot(&near)?, shot(&far)?) {
+            (half, whole) if whole.1.norm() < half.1.norm() => (far, whole),
+            (half, _) => (near, half),
+        };
     }
     None
 }
@@ -136,7 +140,7 @@ fn spinning(
             let step = step(skeleton, &pair, fps)?;
             let more = step.inverse_inertia * (kept - step.momentum) / fps;
             by = UnitQuaternion::from_scaled_axis(more) * by;
-            if more.norm() < LEFT / 10.0 {
+            if more.norm() < LEFT[1] {
                 break;
             }
         }
