@@ -20,7 +20,7 @@ const LEFT: [f64; 2] = [1e-5, 1e-7];
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
 /// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
-const FARTHEST: f64 = 1.0;
+const FARTHEST: f64 = 0.5;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -254,17 +254,17 @@ mod tests {
         let frame = |f: i64| {
             let u = f as f64 / 9.0;
             let mut qpos = skeleton.rest_qpos();
-            let angle = 0.7 * (std::f64::consts::TAU * u).sin() - 3.5 * u;
+            let angle = 0.4 * (std::f64::consts::TAU * u).sin() - 3.5 * u;
             let root = UnitQuaternion::from_euler_angles(0.0, angle, 0.0);
             put_quaternion(&mut qpos, 3, &root);
-            let aside = UnitQuaternion::from_euler_angles(-1.2, -u, 0.0);
+            let aside = UnitQuaternion::from_euler_angles(-0.5, -u, 0.0);
             put_quaternion(&mut qpos, at, &aside);
             qpos
         };
         let mut frames: Vec<Vec<f64>> = (0..10).map(frame).collect();
         let turns = freely(&skeleton, &frames, 16.0).expect("turns");
         let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
-        assert!((0.5..1.0).contains(&farthest), "{farthest} rad");
+        assert!((0.3..0.5).contains(&farthest), "{farthest} rad");
         assert!(turns[9].angle() < 1e-9 && turns[0].angle() < 1e-9);
         let pairs = frames.iter_mut().zip(&turns);
         pairs.for_each(|(qpos, by)| turn(&skeleton, qpos, by));
