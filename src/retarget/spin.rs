@@ -13,10 +13,12 @@ use crate::skeleton::{Skeleton, Twist};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 /// Most corrections of the momentum of a flight, and of the turn of a step.
-const SHOTS: usize = 8;
+const SHOTS: usize = 12;
 const CORRECTIONS: usize = 16;
 /// What may be left of the turn at the end of a flight, and of a step's correction, radians.
-const LEFT: [f64; 2] = [1e-5, 1e-7];
+const LEFT: [f64; 2] = [1e-5, 1e-6];
+/// A step that leaves less than this share of the turn leads on well.
+const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
 /// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
@@ -98,25 +100,33 @@ fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<Unit
         Some((turns, off))
     };
     let (mut turns, mut off) = shot(&kept)?;
+    let mut gives: Option<Matrix3<f64>> = None;
     for _ in 0..SHOTS {
         if off.norm() < LEFT[0] {
             *turns.last_mut()? = UnitQuaternion::identity();
             let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
             return (farthest <= FARTHEST).then_some(turns);
         }
-        let by = VARIED * kept.norm().max(1.0);
-        let mut slope = Matrix3::zeros();
-        for i in 0..3 {
-            let (_, varied) = shot(&(kept + Vector3::ith(i, by)))?;
-            slope.set_column(i, &((varied - off) / by));
-        }
-        let step = slope.try_inverse()? * off;
-        // A whole step may lead too far: the better one of a whole and a half.
-        let (near, far) = (kept - step / 2.0, kept - step);
-        (kept, (turns, off)) = match (shot(&near)?, shot(&far)?) {
-            (half, whole) if whole.1.norm() < half.1.norm() => (far, whole),
-            (half, _) => (near, half),
+        let stiff = match gives {
+            Some(stiff) => stiff,
+            None => {
+                let by = VARIED * kept.norm().max(1.0);
+                let varied = |i| Some((shot(&(kept + Vector3::ith(i, by)))?.1 - off) / by);
+                Matrix3::from_columns(&[varied(0)?, varied(1)?, varied(2)?]).try_inverse()?
+            }
         };
+        let step = stiff * off;
+        let mut found = shot(&(kept - step))?;
+        let mut taken = step;
+        if found.1.norm() > off.norm() {
+            // A whole step may lead too far.
+            taken = step / 2.0;
+            found = shot(&(kept - taken))?;
+        }
+        // As long as it leads on well, what a change gives needn't be asked again.
+        gives = (found.1.norm() < CHORD * off.norm()).then_some(stiff);
+        kept -= taken;
+        (turns, off) = found;
     }
     None
 }
@@ -133,12 +143,12 @@ fn spinning(
         let mut by = *turns.last()?;
         let mut pair = pair.to_vec();
         turn(skeleton, &mut pair[0], &by);
+        let ease = inertia(skeleton, &skeleton.forward(&pair[0])).try_inverse()?;
         let next = pair[1].clone();
         for _ in 0..CORRECTIONS {
             pair[1].clone_from(&next);
             turn(skeleton, &mut pair[1], &by);
-            let step = step(skeleton, &pair, fps)?;
-            let more = step.inverse_inertia * (kept - step.momentum) / fps;
+            let more = ease * (kept - momentum(skeleton, &pair, fps)) / fps;
             by = UnitQuaternion::from_scaled_axis(more) * by;
             if more.norm() < LEFT[1] {
                 break;
@@ -150,15 +160,20 @@ fn spinning(
 }
 
 fn step(skeleton: &Skeleton, pair: &[Vec<f64>], fps: f64) -> Option<Step> {
+    Some(Step {
+        momentum: momentum(skeleton, pair, fps),
+        inverse_inertia: inertia(skeleton, &skeleton.forward(&pair[0])).try_inverse()?,
+    })
+}
+
+/// Mean angular momentum from a frame to the next.
+fn momentum(skeleton: &Skeleton, pair: &[Vec<f64>], fps: f64) -> Vector3<f64> {
     let qvel = skeleton.differentiate(&pair[0], &pair[1], 1.0 / fps);
     let momentum = |qpos: &Vec<f64>| {
         let poses = skeleton.forward(qpos);
         skeleton.momentum(&poses, &skeleton.twists(qpos, &qvel)).1
     };
-    Some(Step {
-        momentum: (momentum(&pair[0]) + momentum(&pair[1])) / 2.0,
-        inverse_inertia: inertia(skeleton, &skeleton.forward(&pair[0])).try_inverse()?,
-    })
+    (momentum(&pair[0]) + momentum(&pair[1])) / 2.0
 }
 
 /// The whole body's inertia about its centre of mass, world axes: a column is the momentum of a turn at 1 rad/s.
