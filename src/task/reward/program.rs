@@ -11,8 +11,8 @@ use crate::task::{Dynamics, Stage};
 use nalgebra::Vector3;
 
 /// pose exp(−2 Σ wⱼ‖q̂ ⊖ q‖²) and velocity exp(−0.1 Σ wⱼ‖ω̂ − ω‖²) over joints with [`joint_weights`], the root's rotation
-/// among them, its rate along the world's axes; end effectors exp(−40 mean‖p̂ − p‖²) over hands and feet as seen from the root, but for their height; root
-/// exp(−5 (‖Δp‖² + 0.1 Δθ² + 0.01 ‖Δv‖² + 0.001 ‖Δω‖²)); centre of mass exp(−‖Δv‖²).
+/// among them, its rate along the world's axes; end effectors exp(−40 mean‖p̂ − p‖²) over hands and feet as seen from the
+/// root, but for their height; root exp(−5 (‖Δp‖² + 0.1 Δθ² + 0.01 ‖Δv‖² + 0.001 ‖Δω‖²)); centre of mass exp(−‖Δv‖²).
 pub(super) fn terms(
     stage: &Stage,
     (links, dynamics): (&[LinkState], &Dynamics),
