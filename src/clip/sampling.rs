@@ -19,22 +19,40 @@ pub(crate) fn slerp(
     a.try_slerp(b, t, 1e-12).unwrap_or(*a)
 }
 
-/// The way made a fraction `t` into the step `now`, between the steps `before` and `after` where there are such: the
-/// cubic Hermite curve whose slopes are those of parabolas through three frames (Catmull and Rom, 1974).
-fn way(
+/// Slopes at the start and the end of the step `now`, between the steps `before` and `after` where there are such: those of
+/// parabolas through three frames (Catmull and Rom, 1974).
+fn slopes(
     before: Option<Vector3<f64>>,
     now: Vector3<f64>,
     after: Option<Vector3<f64>>,
-    t: f64,
-) -> Vector3<f64> {
-    let (start, end) = match (before, after) {
-        (Some(before), Some(after)) => (0.5 * (before + now), 0.5 * (now + after)),
-        (None, Some(after)) => (0.5 * (3.0 * now - after), 0.5 * (now + after)),
-        (Some(before), None) => (0.5 * (before + now), 0.5 * (3.0 * now - before)),
-        (None, None) => (now, now),
-    };
+) -> [Vector3<f64>; 2] {
+    match (before, after) {
+        (Some(before), Some(after)) => [0.5 * (before + now), 0.5 * (now + after)],
+        (None, Some(after)) => [0.5 * (3.0 * now - after), 0.5 * (now + after)],
+        (Some(before), None) => [0.5 * (before + now), 0.5 * (3.0 * now - before)],
+        (None, None) => [now; 2],
+    }
+}
+
+/// The way made a fraction `t` into the step `now` along a cubic curve with these slopes (Hermite's).
+fn way(now: Vector3<f64>, [start, end]: [Vector3<f64>; 2], t: f64) -> Vector3<f64> {
     let (t2, t3) = (t * t, t * t * t);
     now * (3.0 * t2 - 2.0 * t3) + start * (t3 - 2.0 * t2 + t) + end * (t3 - t2)
+}
+
+/// The turn made a fraction `t` into the step `now`, with these slopes: the cubic Bézier curve of rotations (Kim, Kim and
+/// Shin, "A general construction scheme for unit quaternion curves with simple high order derivatives", 1995).
+fn turn(now: &UnitQuaternion<f64>, slopes: [Vector3<f64>; 2], t: f64) -> UnitQuaternion<f64> {
+    let [start, end] = slopes.map(|slope| UnitQuaternion::from_scaled_axis(slope / 3.0));
+    let middle = start.inverse() * now * end.inverse();
+    let u = 1.0 - t;
+    let shares = [1.0 - u * u * u, t * t * (3.0 - 2.0 * t), t * t * t];
+    start.powf(shares[0]) * middle.powf(shares[1]) * end.powf(shares[2])
+}
+
+/// The turn from `a` to `b` in the frame of `a`, the short way round, as a rotation vector.
+fn turned(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> Vector3<f64> {
+    (a.inverse() * b).scaled_axis()
 }
 
 /// Evenly spaced frames over a span of time, the first at its start and the last at its end.
@@ -86,7 +104,7 @@ impl Grid {
 impl Clip {
     /// Transform of every joint in its parent at `time` seconds from the first frame. Before the first and after
     /// the last frame, the clip stands still; a wrapping clip's later cycles are the motion's affair. Between frames,
-    /// rotations turn at constant speed and translations follow a cubic curve.
+    /// rotations and translations follow cubic curves.
     pub fn sample(&self, time: f64) -> Vec<Isometry3<f64>> {
         let last = self.frames.len().saturating_sub(1);
         let at = (time * self.fps).clamp(0.0, last as f64);
@@ -110,13 +128,23 @@ impl Clip {
     /// Transform of joint `j` a fraction `t` of the way from frame `frame` to the next.
     fn between(&self, frame: usize, t: f64, j: usize) -> Isometry3<f64> {
         let (a, b) = (&self.frames[frame][j], &self.frames[frame + 1][j]);
-        let at = |f: usize| self.frames[f][j].translation.vector;
-        let before = frame.checked_sub(1).map(|f| at(frame) - at(f));
-        let after = (frame + 2 < self.frames.len()).then(|| at(frame + 2) - at(frame + 1));
-        let way = way(before, at(frame + 1) - at(frame), after, t);
+        let before = frame.checked_sub(1).map(|f| &self.frames[f][j]);
+        let after = self.frames.get(frame + 2).map(|next| &next[j]);
+        let step = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+            let moved = b.translation.vector - a.translation.vector;
+            (moved, turned(&a.rotation, &b.rotation))
+        };
+        let (into, now, out) = (
+            before.map(|before| step(before, a)),
+            step(a, b),
+            after.map(|after| step(b, after)),
+        );
+        let moving = slopes(into.map(|s| s.0), now.0, out.map(|s| s.0));
+        let turning = slopes(into.map(|s| s.1), now.1, out.map(|s| s.1));
+        let by = UnitQuaternion::from_scaled_axis(now.1);
         Isometry3::from_parts(
-            Translation3::from(a.translation.vector + way),
-            slerp(&a.rotation, &b.rotation, t),
+            Translation3::from(a.translation.vector + way(now.0, moving, t)),
+            a.rotation * turn(&by, turning, t),
         )
     }
 

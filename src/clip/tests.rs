@@ -57,6 +57,31 @@ fn sampling_follows_the_motion_between_frames() {
     assert_eq!(clip.sample(7.0 / 30.0), clip.frames[7]);
 }
 
+/// A joint that turns about one axis after the other, ever faster, at 16 frames a second.
+#[test]
+fn turns_are_as_smooth_between_frames_as_over_them() {
+    let truth = |time: f64| {
+        let about = |axis: Vector3<f64>| UnitQuaternion::from_scaled_axis(axis);
+        about(Vector3::z() * (3.0 * time).sin()) * about(Vector3::x() * (2.0 * time * time))
+    };
+    let mut clip = arm(33, 16.0);
+    for (f, frame) in clip.frames.iter_mut().enumerate() {
+        frame[1].rotation = truth(f as f64 / 16.0);
+    }
+    let at = |time: f64| clip.sample(time)[1].rotation;
+    let between = (4..28).map(|f| (f as f64 + 0.5) / 16.0);
+    let off = between.map(|time| at(time).angle_to(&truth(time)));
+    let worst = off.fold(0.0, f64::max);
+    assert!(worst < 2e-3, "{worst} rad");
+    for f in 4..28 {
+        let (time, step) = (f as f64 / 16.0, 1e-4);
+        let before = at(time - step).inverse() * at(time);
+        let after = at(time).inverse() * at(time + step);
+        let jump = (after.scaled_axis() - before.scaled_axis()).norm() / step;
+        assert!(jump < 0.02, "frame {f}: {jump} rad/s");
+    }
+}
+
 #[test]
 fn resampling_keeps_both_ends_and_the_loop() {
     let clip = arm(31, 30.0);

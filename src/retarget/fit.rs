@@ -102,7 +102,7 @@ impl<'a> Fit<'a> {
     fn lift(&self, goals: &mut Goals, lifts: &[Option<Lift>], frames: &mut [Vec<f64>]) {
         for (f, lift) in lifts.iter().enumerate() {
             let Some(lift) = lift else { continue };
-            flight::lift(self.model, goals, f, &self.anchors[f], lift);
+            flight::lift(self.model, goals, f, &self.air(frames).stood_on(f), lift);
             lift.apply(&mut frames[f]);
         }
         let problem = self.problem(goals);
@@ -114,7 +114,8 @@ impl<'a> Fit<'a> {
     fn tilt(&self, goals: &mut Goals, tilts: &[Option<Tilt>], frames: &mut [Vec<f64>]) {
         for (f, tilt) in tilts.iter().enumerate() {
             let Some(tilt) = tilt else { continue };
-            spin::tilt_goals(self.model, goals, f, &self.anchors[f], (&frames[f], tilt));
+            let anchors = self.air(frames).stood_on(f);
+            spin::tilt_goals(self.model, goals, f, &anchors, (&frames[f], tilt));
             tilt.apply(self.model.skeleton, &mut frames[f]);
         }
         // What flies was turned with its goals, and fits them as before.

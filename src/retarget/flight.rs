@@ -7,6 +7,7 @@
 use super::goals::Goals;
 use super::model::Model;
 use super::solve::carried;
+use super::spin;
 use super::stance::{Anchor, TOUCHES, carries};
 use crate::clip::{Problem, Severity};
 use crate::humanoid::Slot;
@@ -64,6 +65,21 @@ pub(super) struct Flight {
     pub span: (i64, i64),
     /// Frames on the ground before and after it.
     room: [i64; 2],
+    /// How many of these frames may belong to the flight: the body is near the ground there, and may still push on it or not.
+    near: [i64; 2],
+}
+
+impl Flight {
+    /// The same flight in all lengths that it may have.
+    fn lengths(&self) -> impl Iterator<Item = Flight> {
+        let ((a, b), [before, after], [most, most_after]) = (self.span, self.room, self.near);
+        let spans = (0..=most).flat_map(move |i| (0..=most_after).map(move |j| (i, j)));
+        spans.map(move |(i, j)| Flight {
+            span: (a - i, b + j),
+            room: [before - i, after - j],
+            near: [0, 0],
+        })
+    }
 }
 
 impl Air<'_> {
@@ -73,8 +89,9 @@ impl Air<'_> {
         let bodies: Vec<_> = self.frames.iter().map(|q| skeleton.forward(q)).collect();
         let com: Vec<_> = bodies.iter().map(|b| skeleton.com(b)).collect();
         let low: Vec<_> = bodies.iter().map(|b| skeleton.lowest_point(b)).collect();
-        let mut flights = self.flights(&low);
-        flights.retain(|flight| self.shifts(flight.span, |f| com[f]).is_some());
+        let flights = self.flights(&low);
+        let flights = flights.iter().filter_map(|flight| self.meant(flight, &com));
+        let flights: Vec<Flight> = flights.collect();
         let lifts = self.lifts_of(&flights);
         (flights, lifts)
     }
@@ -143,14 +160,33 @@ impl Air<'_> {
         };
         let flights = known.filter(high).map(|(a, b)| {
             let [before, after] = [run(a, -1, false), run(b, 1, false)];
-            let earlier = self.leaves(low, (a, -1), before / 2);
-            let later = self.leaves(low, (b, 1), after / 2);
             Flight {
-                span: (a - earlier, b + later),
-                room: [before - earlier, after - later],
+                span: (a, b),
+                room: [before, after],
+                near: [
+                    self.leaves(low, (a, -1), before / 2),
+                    self.leaves(low, (b, 1), after / 2),
+                ],
             }
         });
         flights.collect()
+    }
+
+    /// The flight in the length in which a body that falls and spins freely takes over the most of its speed where it leaves
+    /// the ground, and hands over the most of it where it comes down; `None` if that is no flight.
+    fn meant(&self, flight: &Flight, com: &[Vector3<f64>]) -> Option<Flight> {
+        let leg = self.model.skeleton.leg_length();
+        let jolt = |flight: &Flight| {
+            let shifts = self.shifts(flight.span, |f| com[f])?;
+            let moved = shifts[1].norm_squared() + shifts[shifts.len() - 2].norm_squared();
+            let turned = spin::jolts(self, flight.span).map_or(0.0, |[a, b]| a * a + b * b);
+            Some(moved * self.fps.powi(2) + turned * leg.powi(2))
+        };
+        let all = flight
+            .lengths()
+            .filter_map(|flight| Some((jolt(&flight)?, flight)));
+        let least = all.min_by(|(a, _), (b, _)| a.total_cmp(b));
+        least.map(|(_, flight)| flight)
     }
 
     /// Frames that a body takes, in direction `step`, from where it is clear of the ground to where it pushes on it: at
@@ -163,6 +199,16 @@ impl Air<'_> {
         };
         let longest = (LEAVES * self.fps).round() as i64;
         (0..longest.min(most)).take_while(above).count() as i64
+    }
+
+    /// What stands in a frame or as near to it as a foot needs to leave the ground or to come down: until it flies it stays
+    /// where it stood.
+    pub fn stood_on(&self, f: usize) -> Vec<Anchor> {
+        let reach = (LEAVES * self.fps).round() as i64;
+        let around = (f as i64 - reach..=f as i64 + reach).filter_map(|index| self.locate(index));
+        around
+            .flat_map(|(_, f)| self.anchors[f].iter().copied())
+            .collect()
     }
 
     fn touches(&self, f: usize) -> bool {
@@ -367,6 +413,44 @@ mod tests {
             let apart = back * shift(round[at]) - shift(*lift);
             assert!(apart.norm() < 1e-9, "{f}: {apart}");
         }
+    }
+
+    /// It rises by a centimetre in 40 ms before it jumps: 20 of them are near enough to the ground to be either's.
+    #[test]
+    fn a_flight_begins_where_its_speed_does() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
+        let (fps, rises, lasts) = (240.0, 10, 96);
+        let rest = skeleton.rest_qpos();
+        let low = skeleton.lowest_point(&skeleton.forward(&rest));
+        let (top, takes_off) = (0.01, STANDS + rises);
+        let height = |f: usize| {
+            let t = f.saturating_sub(takes_off).min(lasts) as f64 / fps;
+            let duration = lasts as f64 / fps;
+            let rise = f.saturating_sub(STANDS).min(rises) as f64 / rises as f64;
+            let sinks = 1.0 - t / duration;
+            top * rise * sinks + GRAVITY * t * (duration - t) / 2.0
+        };
+        let frame = |f: usize| {
+            let mut qpos = rest.clone();
+            qpos[2] += height(f) - low;
+            qpos
+        };
+        let frames: Vec<Vec<f64>> = (0..takes_off + lasts + STANDS).map(frame).collect();
+        let air = Air {
+            model: &Model::new(&skeleton),
+            frames: &frames,
+            anchors: &vec![Vec::new(); frames.len()],
+            cycle: None,
+            fps,
+        };
+        let (flights, _) = air.lifts();
+        let starts: Vec<i64> = flights.iter().map(|flight| flight.span.0).collect();
+        assert!(
+            matches!(starts[..], [start] if start >= takes_off as i64),
+            "{starts:?} {takes_off}"
+        );
+        let low: Vec<f64> = (0..frames.len()).map(height).collect();
+        assert!(air.flights(&low)[0].near[0] > 2, "they are near");
     }
 
     #[test]

@@ -41,9 +41,15 @@ use model::Model;
 use nalgebra::Vector3;
 use source::Source;
 use stance::{Anchor, Contacts};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Instant;
+
+/// Rate below which a clip is retargeted at a multiple of it, what that reaches, Hz, and the most that it is multiplied by.
+const SLOW: f64 = 29.0;
+const OFTEN: f64 = 60.0;
+const MOST_TIMES: f64 = 8.0;
 
 /// Most times that a slot can count: beyond, the solution is hardly determined by anything else.
 const MOST_WEIGHT: f64 = 100.0;
@@ -128,6 +134,7 @@ pub fn retarget(
     check_weights(&options.weights)?;
     let map = joint_map(clip, options)?;
     let (clip, own) = clip.with_margins();
+    let (clip, own) = often_enough(clip, own);
     let clip = clip.as_ref();
     let alignment = align::align(clip, &map, skeleton)?;
     let model = Model::new(skeleton);
@@ -179,6 +186,26 @@ pub fn retarget(
         seconds: start.elapsed().as_secs_f64(),
         iterations,
     })
+}
+
+/// The clip, or one at a multiple of its rate, and which frames are its own: between frames that are far apart a body's
+/// velocity is anyone's guess, and the more so where it flies.
+fn often_enough(clip: Cow<'_, Clip>, own: Range<usize>) -> (Cow<'_, Clip>, Range<usize>) {
+    if clip.fps >= SLOW {
+        return (clip, own);
+    }
+    let times = (OFTEN / clip.fps).ceil().min(MOST_TIMES);
+    match clip.resample(clip.fps * times) {
+        Ok(often) => {
+            let times = times as usize;
+            (
+                Cow::Owned(often),
+                own.start * times..(own.end - 1) * times + 1,
+            )
+        }
+        // What is too long for that goes on as it is.
+        Err(_) => (clip, own),
+    }
 }
 
 fn check_weights(weights: &BTreeMap<Slot, f64>) -> Result<(), RetargetError> {

@@ -14,7 +14,7 @@ const NOTICEABLE: f64 = 0.1;
 /// Time on either side of the seam over which its gap is spread, s.
 const SPREAD: f64 = 0.25;
 /// The same as a part of the cycle; the smaller counts.
-const SHARE: f64 = 0.1;
+const SHARE: f64 = 0.15;
 /// Metres by which a point that stands is moved and still looks as if it stood.
 const HIDES: f64 = 0.01;
 

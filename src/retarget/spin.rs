@@ -21,8 +21,10 @@ const LEFT: [f64; 2] = [1e-5, 1e-6];
 const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
-/// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
+/// A flight that would have to be turned further, in radians and as a share of what it spins, is meant to be as it is: its
+/// spin comes from elsewhere.
 const FARTHEST: f64 = 0.5;
+const OF_SPIN: f64 = 0.2;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -87,48 +89,94 @@ fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(
     ends.chain(flying).collect()
 }
 
-/// The turns of a flight, from the last frame on the ground to the first after it.
-fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<UnitQuaternion<f64>>> {
-    let steps = frames.windows(2).map(|pair| step(skeleton, pair, fps));
-    let steps: Vec<Step> = steps.collect::<Option<_>>()?;
+/// By how much the speed at which a body turns jumps at the beginning of a flight and at its end, if it keeps its momentum
+/// in between; rad/s, for small turns.
+pub(super) fn jolts(air: &Air, (a, b): (i64, i64)) -> Option<[f64; 2]> {
+    let frames: Vec<Vec<f64>> = (a..=b)
+        .map(|index| air.pose(index))
+        .collect::<Option<_>>()?;
+    let steps = steps(air.model.skeleton, &frames, air.fps)?;
+    let kept = kept(&steps)?;
+    let jolt = |step: &Step| (step.inverse_inertia * (kept - step.momentum)).norm();
+    Some([jolt(steps.first()?), jolt(steps.last()?)])
+}
+
+fn steps(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<Step>> {
+    let pairs = frames.windows(2);
+    pairs.map(|pair| step(skeleton, pair, fps)).collect()
+}
+
+/// The momentum that a body keeps which turns as far as in these steps.
+fn kept(steps: &[Step]) -> Option<Vector3<f64>> {
     let ease: Matrix3<f64> = steps.iter().map(|s| s.inverse_inertia).sum();
     let spun: Vector3<f64> = steps.iter().map(|s| s.inverse_inertia * s.momentum).sum();
-    let mut kept = ease.try_inverse()? * spun;
-    let shot = |kept: &Vector3<f64>| {
-        let turns = spinning(skeleton, frames, fps, kept)?;
+    Some(ease.try_inverse()? * spun)
+}
+
+/// The turns of a flight, from the last frame on the ground to the first after it.
+fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<UnitQuaternion<f64>>> {
+    let steps = steps(skeleton, frames, fps)?;
+    let spins = |s: &Step| (s.inverse_inertia * s.momentum).norm() / fps;
+    let spun: f64 = steps.iter().map(spins).sum();
+    let turns = Toss {
+        skeleton,
+        frames,
+        fps,
+    }
+    .hit(kept(&steps)?)?;
+    let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
+    (farthest <= FARTHEST.max(OF_SPIN * spun)).then_some(turns)
+}
+
+/// The frames of a flight, and their rate.
+struct Toss<'a> {
+    skeleton: &'a Skeleton,
+    frames: &'a [Vec<f64>],
+    fps: f64,
+}
+
+impl Toss<'_> {
+    /// The turns that end with none, for a momentum that is near to this one.
+    fn hit(&self, mut kept: Vector3<f64>) -> Option<Vec<UnitQuaternion<f64>>> {
+        let (mut turns, mut off) = self.shoot(&kept)?;
+        let mut gives: Option<Matrix3<f64>> = None;
+        for _ in 0..SHOTS {
+            if off.norm() < LEFT[0] {
+                *turns.last_mut()? = UnitQuaternion::identity();
+                return Some(turns);
+            }
+            let stiff = match gives {
+                Some(stiff) => stiff,
+                None => self.stiffness(&kept, &off)?,
+            };
+            let mut step = stiff * off;
+            let mut found = self.shoot(&(kept - step))?;
+            if found.1.norm() > off.norm() {
+                // A whole step may lead too far.
+                step /= 2.0;
+                found = self.shoot(&(kept - step))?;
+            }
+            // As long as it leads on well, what a change gives needn't be asked again.
+            gives = (found.1.norm() < CHORD * off.norm()).then_some(stiff);
+            kept -= step;
+            (turns, off) = found;
+        }
+        None
+    }
+
+    /// The turns that keep a momentum, and what is left of them at the end.
+    fn shoot(&self, kept: &Vector3<f64>) -> Option<(Vec<UnitQuaternion<f64>>, Vector3<f64>)> {
+        let turns = spinning(self.skeleton, self.frames, self.fps, kept)?;
         let off = turns.last()?.scaled_axis();
         Some((turns, off))
-    };
-    let (mut turns, mut off) = shot(&kept)?;
-    let mut gives: Option<Matrix3<f64>> = None;
-    for _ in 0..SHOTS {
-        if off.norm() < LEFT[0] {
-            *turns.last_mut()? = UnitQuaternion::identity();
-            let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
-            return (farthest <= FARTHEST).then_some(turns);
-        }
-        let stiff = match gives {
-            Some(stiff) => stiff,
-            None => {
-                let by = VARIED * kept.norm().max(1.0);
-                let varied = |i| Some((shot(&(kept + Vector3::ith(i, by)))?.1 - off) / by);
-                Matrix3::from_columns(&[varied(0)?, varied(1)?, varied(2)?]).try_inverse()?
-            }
-        };
-        let step = stiff * off;
-        let mut found = shot(&(kept - step))?;
-        let mut taken = step;
-        if found.1.norm() > off.norm() {
-            // A whole step may lead too far.
-            taken = step / 2.0;
-            found = shot(&(kept - taken))?;
-        }
-        // As long as it leads on well, what a change gives needn't be asked again.
-        gives = (found.1.norm() < CHORD * off.norm()).then_some(stiff);
-        kept -= taken;
-        (turns, off) = found;
     }
-    None
+
+    /// The change of momentum for a change of the turn at the end, where that is `off`.
+    fn stiffness(&self, kept: &Vector3<f64>, off: &Vector3<f64>) -> Option<Matrix3<f64>> {
+        let by = VARIED * kept.norm().max(1.0);
+        let varied = |i| Some((self.shoot(&(kept + Vector3::ith(i, by)))?.1 - off) / by);
+        Matrix3::from_columns(&[varied(0)?, varied(1)?, varied(2)?]).try_inverse()
+    }
 }
 
 /// The turns with which the frames keep a momentum, from none on.

@@ -213,7 +213,7 @@ def measure(rig, clip, motion):
     zero = rig.pose(np.r_[0, 0, 0, rig.model.qpos0[3:]])
     ours = {s: zero[b] for s, b in rig.body.items()}
     scale = leg(ours) / leg(rest)
-    qpos, fps = m["qpos"], moved["fps"]
+    qpos, fps = m["qpos"], header["fps"]
     corners = rig.corners()
     bodies, surfaces, overlaps, depth, outside = [], [], [], 0.0, 0
     for q in qpos:
@@ -223,7 +223,9 @@ def measure(rig, clip, motion):
         depth = max(depth, max(c[2] - p[:, 2].min() for c, p in zip(corners, at)))
         outside += rig.outside(q)
         overlaps.append(max(rig.overlap(), 0.0))
-    bodies = np.array(bodies)
+    # A clip of few frames a second becomes a motion of a multiple of them: these are the clip's own.
+    times = max(round(moved["fps"] / fps), 1)
+    bodies, surfaces, qpos = np.array(bodies)[::times], surfaces[::times], qpos[::times]
     count = min(len(qpos), len(world))
     at = {s: bodies[:count, b] for s, b in rig.body.items()}
     source = {s: p[:count] for s, p in source.items()}
