@@ -46,7 +46,7 @@ impl<'a> Fit<'a> {
         let mut tilts = Vec::new();
         if !flights.is_empty() {
             self.lift(goals, &lifts, &mut frames);
-            tilts = spin::tilts(&self.air(&frames), &flights);
+            tilts = spin::tilts(&self.air(&frames), &flights, spin::within_reason);
             self.tilt(goals, &tilts, &mut frames);
         }
         let problem = self.problem(goals);
@@ -132,7 +132,7 @@ impl<'a> Fit<'a> {
                 lift.apply(qpos);
             }
         }
-        let tilts = spin::tilts(&self.air(frames), flights);
+        let tilts = spin::tilts(&self.air(frames), flights, spin::by_little);
         for (qpos, tilt) in frames.iter_mut().zip(tilts) {
             if let Some(tilt) = tilt.filter(|tilt| tilt.flies) {
                 tilt.apply(self.model.skeleton, qpos);

@@ -20,6 +20,8 @@ const HIGH: f64 = 0.03;
 /// Height up to which it still pushes, leg lengths; and how long before and after it is clear it is looked for, s.
 const PUSHES: f64 = 0.004;
 const LEAVES: f64 = 0.05;
+/// By how much more the squared speeds of a longer flight may jump at its ends than those of the smoothest.
+const JOLTS: f64 = 1.33;
 /// Shortest flight, s.
 const SHORTEST: f64 = 0.1;
 /// A flight falls at least half as fast as it should: slower ones are steps with feet that float, …
@@ -172,8 +174,8 @@ impl Air<'_> {
         flights.collect()
     }
 
-    /// The flight in the length in which a body that falls and spins freely takes over the most of its speed where it leaves
-    /// the ground, and hands over the most of it where it comes down; `None` if that is no flight.
+    /// The longest flight in which a body that falls and spins freely takes over hardly less of its speed, where it leaves the
+    /// ground and where it comes down, than in any other; `None` if there is no flight.
     fn meant(&self, flight: &Flight, com: &[Vector3<f64>]) -> Option<Flight> {
         let leg = self.model.skeleton.leg_length();
         let jolt = |flight: &Flight| {
@@ -185,8 +187,14 @@ impl Air<'_> {
         let all = flight
             .lengths()
             .filter_map(|flight| Some((jolt(&flight)?, flight)));
-        let least = all.min_by(|(a, _), (b, _)| a.total_cmp(b));
-        least.map(|(_, flight)| flight)
+        let all: Vec<(f64, Flight)> = all.collect();
+        let least = all
+            .iter()
+            .map(|(jolt, _)| *jolt)
+            .fold(f64::INFINITY, f64::min);
+        let smooth = all.into_iter().filter(|(jolt, _)| *jolt <= JOLTS * least);
+        let longest = smooth.max_by_key(|(_, flight)| flight.span.1 - flight.span.0);
+        longest.map(|(_, flight)| flight)
     }
 
     /// Frames that a body takes, in direction `step`, from where it is clear of the ground to where it pushes on it: at

@@ -21,10 +21,12 @@ const LEFT: [f64; 2] = [1e-5, 1e-6];
 const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
-/// A flight that would have to be turned further, in radians and as a share of what it spins, is meant to be as it is: its
-/// spin comes from elsewhere.
+/// A flight that would have to be turned further is turned as far, and its spin changes by less than before. Radians.
 const FARTHEST: f64 = 0.5;
-const OF_SPIN: f64 = 0.2;
+/// One that would have to be turned so far is meant to be as it is: its spin comes from elsewhere. Radians.
+const ELSEWHERE: f64 = 1.0;
+/// What is by so little off as fitting anew makes it, radians.
+const LITTLE: f64 = 0.1;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -53,14 +55,41 @@ impl Tilt {
     }
 }
 
-/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `None` where it
-/// stays.
-pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Vec<Option<Tilt>> {
+/// The turns of a flight, none in the first and the last.
+type Turns = Vec<UnitQuaternion<f64>>;
+
+/// As far as a flight may be turned.
+pub(super) fn within_reason(turns: Turns) -> Option<Turns> {
+    let needs = farthest(&turns);
+    if needs <= FARTHEST {
+        return Some(turns);
+    }
+    let turns = turns.iter().map(|turn| turn.powf(FARTHEST / needs));
+    (needs < ELSEWHERE).then(|| turns.collect())
+}
+
+/// What is only to be put right.
+pub(super) fn by_little(turns: Turns) -> Option<Turns> {
+    (farthest(&turns) < LITTLE).then_some(turns)
+}
+
+fn farthest(turns: &Turns) -> f64 {
+    turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max)
+}
+
+/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin, as far as `may` lets
+/// it; `None` where it stays.
+pub(super) fn tilts(
+    air: &Air,
+    flights: &[Flight],
+    may: fn(Turns) -> Option<Turns>,
+) -> Vec<Option<Tilt>> {
     let mut tilts = vec![None; air.frames.len()];
     for flight in flights {
         let (a, b) = flight.span;
         let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
-        let Some(found) = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps)) else {
+        let free = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps));
+        let Some(found) = free.and_then(may) else {
             continue;
         };
         for (index, tilt) in with_ends(air, flight, &found) {
@@ -114,18 +143,13 @@ fn kept(steps: &[Step]) -> Option<Vector3<f64>> {
 }
 
 /// The turns of a flight, from the last frame on the ground to the first after it.
-fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<UnitQuaternion<f64>>> {
-    let steps = steps(skeleton, frames, fps)?;
-    let spins = |s: &Step| (s.inverse_inertia * s.momentum).norm() / fps;
-    let spun: f64 = steps.iter().map(spins).sum();
-    let turns = Toss {
+fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Turns> {
+    let toss = Toss {
         skeleton,
         frames,
         fps,
-    }
-    .hit(kept(&steps)?)?;
-    let farthest = turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max);
-    (farthest <= FARTHEST.max(OF_SPIN * spun)).then_some(turns)
+    };
+    toss.hit(kept(&steps(skeleton, frames, fps)?)?)
 }
 
 /// The frames of a flight, and their rate.
@@ -137,7 +161,7 @@ struct Toss<'a> {
 
 impl Toss<'_> {
     /// The turns that end with none, for a momentum that is near to this one.
-    fn hit(&self, mut kept: Vector3<f64>) -> Option<Vec<UnitQuaternion<f64>>> {
+    fn hit(&self, mut kept: Vector3<f64>) -> Option<Turns> {
         let (mut turns, mut off) = self.shoot(&kept)?;
         let mut gives: Option<Matrix3<f64>> = None;
         for _ in 0..SHOTS {
@@ -165,7 +189,7 @@ impl Toss<'_> {
     }
 
     /// The turns that keep a momentum, and what is left of them at the end.
-    fn shoot(&self, kept: &Vector3<f64>) -> Option<(Vec<UnitQuaternion<f64>>, Vector3<f64>)> {
+    fn shoot(&self, kept: &Vector3<f64>) -> Option<(Turns, Vector3<f64>)> {
         let turns = spinning(self.skeleton, self.frames, self.fps, kept)?;
         let off = turns.last()?.scaled_axis();
         Some((turns, off))
@@ -267,11 +291,16 @@ pub(super) fn tilt_goals(
 
 /// Tells of flights that were turned far.
 pub(super) fn problem(turned: f64) -> Option<Problem> {
+    let rest = if turned > FARTHEST - LEFT[1] {
+        "; further it would be another motion, so some of that change is left"
+    } else {
+        ""
+    };
     (turned > TOLD).then(|| Problem {
         id: "spin-corrected".to_owned(),
         severity: Severity::Note,
         message: format!(
-            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air; the distance from the source's joints has that in it",
+            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air{rest}; the distance from the source's joints has that in it",
             turned.to_degrees()
         ),
     })
@@ -340,6 +369,26 @@ mod tests {
     }
 
     #[test]
+    fn a_flight_is_turned_within_reason() {
+        let turns = |angle: f64| -> Turns {
+            let turn = |share: f64| UnitQuaternion::from_scaled_axis(Vector3::y() * angle * share);
+            [0.0, 0.5, 1.0, 0.0].map(turn).to_vec()
+        };
+        let angles = |turns: Turns| -> Vec<f64> { turns.iter().map(|t| t.angle()).collect() };
+        let most = angles(within_reason(turns(0.9)).expect("turns"));
+        assert!((most[1] - 0.25).abs() < 1e-9 && (most[2] - 0.5).abs() < 1e-9);
+        assert_eq!(within_reason(turns(0.4)), Some(turns(0.4)));
+        assert_eq!(within_reason(turns(1.2)), None);
+        assert_eq!(by_little(turns(0.2)), None);
+        assert_eq!(by_little(turns(0.05)), Some(turns(0.05)));
+        let told = |turned| problem(turned).map(|p| p.message.contains("is left"));
+        assert_eq!(
+            [told(0.05), told(0.3), told(0.5)],
+            [None, Some(false), Some(true)]
+        );
+    }
+
+    #[test]
     fn the_momentum_of_a_flight_stays() {
         let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
         let still = leap(&skeleton);
@@ -353,7 +402,7 @@ mod tests {
         let (flights, _) = air.lifts();
         let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
         assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-        let found = tilts(&air, &flights);
+        let found = tilts(&air, &flights, within_reason);
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
             let Some(Tilt { by, flies }) = turned else {
