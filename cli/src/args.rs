@@ -81,7 +81,7 @@ pub struct ImportArgs {
     /// Take to read, by name or by number from 1; `mimic import` has `all` as well [default: the one with most motion]
     #[arg(long, value_name = "TAKE")]
     take: Option<String>,
-    /// Frames per second to sample at [default: the take's own]
+    /// Frames per second to sample at; below 27 a motion has a multiple of them [default: the take's own]
     #[arg(long, value_name = "HZ", value_parser = positive)]
     fps: Option<f64>,
     /// Part to keep, in seconds from the start of the take

@@ -5,6 +5,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A rate this close to the wanted one, relative to it, counts as the wanted one: files write 1/30 s as 0.033332.
 const SAME_RATE: f64 = 1e-4;
+/// Turn from a frame to the next from which on its neighbours say nothing about how it goes, radians.
+const WILD: f64 = 2.0;
 /// Most frames × joints that a clip may grow to.
 pub(crate) const MOST_TRANSFORMS: usize = 20_000_000;
 /// Highest frame rate that is sampled, in Hz.
@@ -48,6 +50,14 @@ fn turn(now: &UnitQuaternion<f64>, slopes: [Vector3<f64>; 2], t: f64) -> UnitQua
     let u = 1.0 - t;
     let shares = [1.0 - u * u * u, t * t * (3.0 - 2.0 * t), t * t * t];
     start.powf(shares[0]) * middle.powf(shares[1]) * end.powf(shares[2])
+}
+
+/// Slopes of a turn between others; even ones where one is so far that it may as well have gone the other way round.
+fn turning(steps: [Option<Vector3<f64>>; 3], now: Vector3<f64>) -> [Vector3<f64>; 2] {
+    if steps.iter().flatten().any(|step| step.norm() > WILD) {
+        return [now; 2];
+    }
+    slopes(steps[0], now, steps[2])
 }
 
 /// The turn from `a` to `b` in the frame of `a`, the short way round, as a rotation vector.
@@ -128,24 +138,45 @@ impl Clip {
     /// Transform of joint `j` a fraction `t` of the way from frame `frame` to the next.
     fn between(&self, frame: usize, t: f64, j: usize) -> Isometry3<f64> {
         let (a, b) = (&self.frames[frame][j], &self.frames[frame + 1][j]);
-        let before = frame.checked_sub(1).map(|f| &self.frames[f][j]);
-        let after = self.frames.get(frame + 2).map(|next| &next[j]);
         let step = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
             let moved = b.translation.vector - a.translation.vector;
             (moved, turned(&a.rotation, &b.rotation))
         };
-        let (into, now, out) = (
-            before.map(|before| step(before, a)),
-            step(a, b),
-            after.map(|after| step(b, after)),
+        let beside = |[a, b]: [usize; 2]| {
+            let (a, b) = (self.frames[a].get(j)?, self.frames[b].get(j)?);
+            Some(step(a, b))
+        };
+        let [into, out] = self.beside(frame).map(|pair| pair.and_then(beside));
+        let now = step(a, b);
+        // Where a cycle goes on, its root may head elsewhere.
+        let in_place = |step: Option<(Vector3<f64>, Vector3<f64>)>, within: bool| {
+            step.filter(|_| within || self.joints[j].parent.is_some())
+        };
+        let last = self.frames.len() - 1;
+        let moving = slopes(
+            in_place(into, frame > 0).map(|s| s.0),
+            now.0,
+            in_place(out, frame + 2 <= last).map(|s| s.0),
         );
-        let moving = slopes(into.map(|s| s.0), now.0, out.map(|s| s.0));
-        let turning = slopes(into.map(|s| s.1), now.1, out.map(|s| s.1));
+        let turns = [into.map(|s| s.1), Some(now.1), out.map(|s| s.1)];
+        let turning = turning(turns, now.1);
         let by = UnitQuaternion::from_scaled_axis(now.1);
         Isometry3::from_parts(
             Translation3::from(a.translation.vector + way(now.0, moving, t)),
             a.rotation * turn(&by, turning, t),
         )
+    }
+
+    /// The steps before and after the one from frame `frame`, as pairs of frames; those of a cycle go on over its seam.
+    fn beside(&self, frame: usize) -> [Option<[usize; 2]>; 2] {
+        let last = self.frames.len() - 1;
+        let goes_on = self.loop_mode == LoopMode::Wrap && last > 1;
+        let before = frame.checked_sub(1).map(|f| [f, frame]);
+        let after = (frame + 2 <= last).then_some([frame + 1, frame + 2]);
+        [
+            before.or_else(|| goes_on.then_some([last - 1, last])),
+            after.or_else(|| goes_on.then_some([0, 1])),
+        ]
     }
 
     /// The same clip at another rate: the first and last frames stay, so the rate is the nearest to `fps` that

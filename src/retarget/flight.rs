@@ -22,6 +22,10 @@ const PUSHES: f64 = 0.004;
 const LEAVES: f64 = 0.05;
 /// By how much more the squared speeds of a longer flight may jump at its ends than those of the smoothest.
 const JOLTS: f64 = 1.33;
+/// What no one sees of that, (m/s)².
+const SMOOTH: f64 = 4e-4;
+/// Beginnings, and ends, of a flight that are tried beside the first.
+const LENGTHS: usize = 4;
 /// Shortest flight, s.
 const SHORTEST: f64 = 0.1;
 /// A flight falls at least half as fast as it should: slower ones are steps with feet that float, …
@@ -72,10 +76,14 @@ pub(super) struct Flight {
 }
 
 impl Flight {
-    /// The same flight in all lengths that it may have.
+    /// The same flight in the lengths that it may have, some of them where there are many.
     fn lengths(&self) -> impl Iterator<Item = Flight> {
-        let ((a, b), [before, after], [most, most_after]) = (self.span, self.room, self.near);
-        let spans = (0..=most).flat_map(move |i| (0..=most_after).map(move |j| (i, j)));
+        let ((a, b), [before, after]) = (self.span, self.room);
+        let [earlier, later] = self.near.map(|near| {
+            let every = (near as usize / LENGTHS).max(1);
+            (0..=near).rev().step_by(every)
+        });
+        let spans = earlier.flat_map(move |i| later.clone().map(move |j| (i, j)));
         spans.map(move |(i, j)| Flight {
             span: (a - i, b + j),
             room: [before - i, after - j],
@@ -166,8 +174,8 @@ impl Air<'_> {
                 span: (a, b),
                 room: [before, after],
                 near: [
-                    self.leaves(low, (a, -1), before / 2),
-                    self.leaves(low, (b, 1), after / 2),
+                    self.leaves(low, (a, -1), (before - 1) / 2),
+                    self.leaves(low, (b, 1), (after - 1) / 2),
                 ],
             }
         });
@@ -177,23 +185,26 @@ impl Air<'_> {
     /// The longest flight in which a body that falls and spins freely takes over hardly less of its speed, where it leaves the
     /// ground and where it comes down, than in any other; `None` if there is no flight.
     fn meant(&self, flight: &Flight, com: &[Vector3<f64>]) -> Option<Flight> {
+        let widest = flight.lengths().next()?.span;
+        let spins = spin::Spins::new(self, widest);
         let leg = self.model.skeleton.leg_length();
         let jolt = |flight: &Flight| {
             let shifts = self.shifts(flight.span, |f| com[f])?;
             let moved = shifts[1].norm_squared() + shifts[shifts.len() - 2].norm_squared();
-            let turned = spin::jolts(self, flight.span).map_or(0.0, |[a, b]| a * a + b * b);
+            let turned = spins.as_ref().and_then(|spins| spins.jolts(flight.span));
+            let turned = turned.map_or(0.0, |[a, b]| a * a + b * b);
             Some(moved * self.fps.powi(2) + turned * leg.powi(2))
         };
-        let all = flight
-            .lengths()
-            .filter_map(|flight| Some((jolt(&flight)?, flight)));
+        let all = flight.lengths().filter_map(|one| Some((jolt(&one)?, one)));
         let all: Vec<(f64, Flight)> = all.collect();
-        let least = all
-            .iter()
-            .map(|(jolt, _)| *jolt)
-            .fold(f64::INFINITY, f64::min);
-        let smooth = all.into_iter().filter(|(jolt, _)| *jolt <= JOLTS * least);
-        let longest = smooth.max_by_key(|(_, flight)| flight.span.1 - flight.span.0);
+        let least = all.iter().map(|(jolt, _)| *jolt);
+        let least = least.fold(f64::INFINITY, f64::min);
+        let smooth = all
+            .into_iter()
+            .filter(|(jolt, _)| *jolt <= JOLTS * least + SMOOTH);
+        let lasts = |flight: &Flight| flight.span.1 - flight.span.0;
+        let longest = smooth
+            .max_by(|(jolt, a), (other, b)| lasts(a).cmp(&lasts(b)).then(other.total_cmp(jolt)));
         longest.map(|(_, flight)| flight)
     }
 

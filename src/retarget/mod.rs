@@ -15,6 +15,7 @@ mod ground;
 mod model;
 mod overlap;
 mod pace;
+mod rate;
 mod reach;
 mod reference;
 mod report;
@@ -41,15 +42,9 @@ use model::Model;
 use nalgebra::Vector3;
 use source::Source;
 use stance::{Anchor, Contacts};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Instant;
-
-/// Rate below which a clip is retargeted at a multiple of it, what that reaches, Hz, and the most that it is multiplied by.
-const SLOW: f64 = 29.0;
-const OFTEN: f64 = 60.0;
-const MOST_TIMES: f64 = 8.0;
 
 /// Most times that a slot can count: beyond, the solution is hardly determined by anything else.
 const MOST_WEIGHT: f64 = 100.0;
@@ -120,7 +115,8 @@ pub struct Retargeted {
     pub iterations: usize,
 }
 
-/// Carries `clip` onto `skeleton`.
+/// Carries `clip` onto `skeleton`. Of a clip of fewer than 27 frames a second the motion has a multiple of them, 60 a second
+/// or up to eight times as many.
 ///
 /// # Errors
 /// [`RetargetError`] when the clip is no humanoid or malformed, or the skeleton lacks legs.
@@ -134,18 +130,19 @@ pub fn retarget(
     check_weights(&options.weights)?;
     let map = joint_map(clip, options)?;
     let (clip, own) = clip.with_margins();
-    let (clip, own) = often_enough(clip, own);
+    let wraps = clip.loop_mode == LoopMode::Wrap && clip.frames.len() > SHORTEST_CYCLE;
+    let mut problems = clip.problems.clone();
+    problems.extend(rate::problem(&clip));
+    let (clip, own) = rate::often_enough(clip, own);
     let clip = clip.as_ref();
     let alignment = align::align(clip, &map, skeleton)?;
     let model = Model::new(skeleton);
     let mut goals = Goals::new(clip, &map, &alignment, &model, &options.weights);
     let leg = skeleton.leg_length();
     let mut source = Source::new(clip, &map, &alignment, skeleton);
-    let mut problems = clip.problems.clone();
     problems.extend(restore_travel(clip, &model, &mut goals, &mut source));
     let mut contacts = put_on_ground(clip, &model, &mut goals, &mut source, own.start);
     swing::hang(&mut goals, ankle_height(skeleton), leg);
-    let wraps = clip.loop_mode == LoopMode::Wrap && goals.frames() > SHORTEST_CYCLE;
     let cycle = wraps.then(|| seam::cycle(&goals, &model));
     let mut closed = None;
     if let Some(cycle) = &cycle {
@@ -165,9 +162,10 @@ pub fn retarget(
         iterations,
         lifted,
         turned,
+        spins_freely,
     } = fit.run(&mut goals);
     problems.extend(flight::problem(lifted));
-    problems.extend(spin::problem(turned));
+    problems.extend(spin::problem(turned, spins_freely));
     goals.keep(&own);
     source.keep(&own);
     keep(&mut anchors, &own);
@@ -186,26 +184,6 @@ pub fn retarget(
         seconds: start.elapsed().as_secs_f64(),
         iterations,
     })
-}
-
-/// The clip, or one at a multiple of its rate, and which frames are its own: between frames that are far apart a body's
-/// velocity is anyone's guess, and the more so where it flies.
-fn often_enough(clip: Cow<'_, Clip>, own: Range<usize>) -> (Cow<'_, Clip>, Range<usize>) {
-    if clip.fps >= SLOW {
-        return (clip, own);
-    }
-    let times = (OFTEN / clip.fps).ceil().min(MOST_TIMES);
-    match clip.resample(clip.fps * times) {
-        Ok(often) => {
-            let times = times as usize;
-            (
-                Cow::Owned(often),
-                own.start * times..(own.end - 1) * times + 1,
-            )
-        }
-        // What is too long for that goes on as it is.
-        Err(_) => (clip, own),
-    }
 }
 
 fn check_weights(weights: &BTreeMap<Slot, f64>) -> Result<(), RetargetError> {

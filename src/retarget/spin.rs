@@ -25,8 +25,6 @@ const VARIED: f64 = 1e-3;
 const FARTHEST: f64 = 0.5;
 /// One that would have to be turned so far is meant to be as it is: its spin comes from elsewhere. Radians.
 const ELSEWHERE: f64 = 1.0;
-/// What is by so little off as fitting anew makes it, radians.
-const LITTLE: f64 = 0.1;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -58,8 +56,46 @@ impl Tilt {
 /// The turns of a flight, none in the first and the last.
 type Turns = Vec<UnitQuaternion<f64>>;
 
+/// How flights are turned.
+pub(super) struct Tilts {
+    /// By frame; `None` where it stays.
+    pub frames: Vec<Option<Tilt>>,
+    /// The flights that spin freely with that; the others were turned as far as is reasonable, or not at all.
+    pub free: Vec<Flight>,
+}
+
+/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin.
+pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Tilts {
+    let mut tilts = Tilts {
+        frames: vec![None; air.frames.len()],
+        free: Vec::new(),
+    };
+    for flight in flights {
+        let (a, b) = flight.span;
+        let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
+        let turns = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps));
+        let Some((needs, turns)) = turns.map(|turns| (farthest(&turns), turns)) else {
+            continue;
+        };
+        let Some(turns) = within_reason(turns) else {
+            continue;
+        };
+        if needs <= FARTHEST {
+            tilts.free.push(flight.clone());
+        }
+        for (index, tilt) in with_ends(air, flight, &turns) {
+            if let Some((n, f)) = air.locate(index) {
+                let heading = air.offset(n).rotation;
+                let by = heading.inverse() * tilt.by * heading;
+                tilts.frames[f] = Some(Tilt { by, ..tilt });
+            }
+        }
+    }
+    tilts
+}
+
 /// As far as a flight may be turned.
-pub(super) fn within_reason(turns: Turns) -> Option<Turns> {
+fn within_reason(turns: Turns) -> Option<Turns> {
     let needs = farthest(&turns);
     if needs <= FARTHEST {
         return Some(turns);
@@ -68,49 +104,20 @@ pub(super) fn within_reason(turns: Turns) -> Option<Turns> {
     (needs < ELSEWHERE).then(|| turns.collect())
 }
 
-/// What is only to be put right.
-pub(super) fn by_little(turns: Turns) -> Option<Turns> {
-    (farthest(&turns) < LITTLE).then_some(turns)
-}
-
-fn farthest(turns: &Turns) -> f64 {
+fn farthest(turns: &[UnitQuaternion<f64>]) -> f64 {
     turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max)
 }
 
-/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin, as far as `may` lets
-/// it; `None` where it stays.
-pub(super) fn tilts(
-    air: &Air,
-    flights: &[Flight],
-    may: fn(Turns) -> Option<Turns>,
-) -> Vec<Option<Tilt>> {
-    let mut tilts = vec![None; air.frames.len()];
-    for flight in flights {
-        let (a, b) = flight.span;
-        let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
-        let free = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps));
-        let Some(found) = free.and_then(may) else {
-            continue;
-        };
-        for (index, tilt) in with_ends(air, flight, &found) {
-            if let Some((n, f)) = air.locate(index) {
-                let heading = air.offset(n).rotation;
-                let by = heading.inverse() * tilt.by * heading;
-                tilts[f] = Some(Tilt { by, ..tilt });
-            }
-        }
-    }
-    tilts
-}
-
 /// A flight's turns, and before and after it those that lead to and from their speed: the faster, as legs that stand have
-/// no part in them.
+/// no part in them, but no farther than those of the flight.
 fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(i64, Tilt)> {
     let last = turns.len() - 1;
+    let most = farthest(turns);
     let tilt = |by, flies| Tilt { by, flies };
     let ends = air.ends(flight).into_iter().map(|(index, end, share)| {
         let next = [turns[1], turns[last - 1]][end].scaled_axis();
-        let by = UnitQuaternion::from_scaled_axis(next * (LEADS * share));
+        let by = (next * (LEADS * share)).cap_magnitude(most);
+        let by = UnitQuaternion::from_scaled_axis(by);
         (index, tilt(by, false))
     });
     let flying = turns.iter().enumerate().take(last).skip(1);
@@ -118,16 +125,30 @@ fn with_ends(air: &Air, flight: &Flight, turns: &[UnitQuaternion<f64>]) -> Vec<(
     ends.chain(flying).collect()
 }
 
-/// By how much the speed at which a body turns jumps at the beginning of a flight and at its end, if it keeps its momentum
-/// in between; rad/s, for small turns.
-pub(super) fn jolts(air: &Air, (a, b): (i64, i64)) -> Option<[f64; 2]> {
-    let frames: Vec<Vec<f64>> = (a..=b)
-        .map(|index| air.pose(index))
-        .collect::<Option<_>>()?;
-    let steps = steps(air.model.skeleton, &frames, air.fps)?;
-    let kept = kept(&steps)?;
-    let jolt = |step: &Step| (step.inverse_inertia * (kept - step.momentum)).norm();
-    Some([jolt(steps.first()?), jolt(steps.last()?)])
+/// How a body spins from frame to frame.
+pub(super) struct Spins {
+    /// Index of the first frame.
+    from: i64,
+    steps: Vec<Step>,
+}
+
+impl Spins {
+    /// From frame `from` to frame `to`.
+    pub fn new(air: &Air, (from, to): (i64, i64)) -> Option<Spins> {
+        let frames: Option<Vec<_>> = (from..=to).map(|index| air.pose(index)).collect();
+        let steps = steps(air.model.skeleton, &frames?, air.fps)?;
+        Some(Spins { from, steps })
+    }
+
+    /// By how much the speed at which a body turns jumps in frame `a` and in frame `b`, if it keeps its momentum in between;
+    /// rad/s, for small turns.
+    pub fn jolts(&self, (a, b): (i64, i64)) -> Option<[f64; 2]> {
+        let at = |index: i64| usize::try_from(index - self.from).ok();
+        let steps = self.steps.get(at(a)?..at(b)?)?;
+        let kept = kept(steps)?;
+        let jolt = |step: &Step| (step.inverse_inertia * (kept - step.momentum)).norm();
+        Some([jolt(steps.first()?), jolt(steps.last()?)])
+    }
 }
 
 fn steps(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Vec<Step>> {
@@ -289,12 +310,12 @@ pub(super) fn tilt_goals(
     }
 }
 
-/// Tells of flights that were turned far.
-pub(super) fn problem(turned: f64) -> Option<Problem> {
-    let rest = if turned > FARTHEST - LEFT[1] {
-        "; further it would be another motion, so some of that change is left"
-    } else {
+/// Tells of flights that were turned far, and whether `all` of them spin freely now.
+pub(super) fn problem(turned: f64, all: bool) -> Option<Problem> {
+    let rest = if all {
         ""
+    } else {
+        "; further it would be another motion, so some of that change is left"
     };
     (turned > TOLD).then(|| Problem {
         id: "spin-corrected".to_owned(),
@@ -379,9 +400,7 @@ mod tests {
         assert!((most[1] - 0.25).abs() < 1e-9 && (most[2] - 0.5).abs() < 1e-9);
         assert_eq!(within_reason(turns(0.4)), Some(turns(0.4)));
         assert_eq!(within_reason(turns(1.2)), None);
-        assert_eq!(by_little(turns(0.2)), None);
-        assert_eq!(by_little(turns(0.05)), Some(turns(0.05)));
-        let told = |turned| problem(turned).map(|p| p.message.contains("is left"));
+        let told = |turned| problem(turned, turned < 0.5).map(|p| p.message.contains("is left"));
         assert_eq!(
             [told(0.05), told(0.3), told(0.5)],
             [None, Some(false), Some(true)]
@@ -402,7 +421,7 @@ mod tests {
         let (flights, _) = air.lifts();
         let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
         assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-        let found = tilts(&air, &flights, within_reason);
+        let found = tilts(&air, &flights).frames;
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
             let Some(Tilt { by, flies }) = turned else {

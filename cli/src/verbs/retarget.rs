@@ -60,6 +60,7 @@ impl Args {
         let mut report = json!({
             "motion": output,
             "frames": frames,
+            "fps": motion.fps,
             "seconds": seconds,
             "frames_per_second": frames as f64 / seconds.max(1e-9),
             "quality": quality,
@@ -82,13 +83,14 @@ fn text(report: &Value) -> String {
     };
     let motion = report["motion"].as_str().unwrap_or_default();
     format!(
-        "{motion}: {} frames in {:.2} s\n  \
+        "{motion}: {} frames at {:.1} Hz in {:.2} s\n  \
          keypoint error   mean {:.1} cm, most {:.1} cm\n  \
          skate            {:.1} cm/s while the source stands\n  \
          penetration      mean {:.1} cm, most {:.1} cm\n  \
          height           {:.1} cm while the source stands\n  \
          joint limits     {} violations",
         report["frames"],
+        number("/fps"),
         number("/seconds"),
         100.0 * number("/keypoint_error_m/mean"),
         100.0 * number("/keypoint_error_m/max"),
