@@ -82,6 +82,24 @@ fn turns_are_as_smooth_between_frames_as_over_them() {
     }
 }
 
+/// A joint that sways once in a cycle of eight frames.
+#[test]
+fn a_cycle_is_as_smooth_over_its_seam() {
+    let mut clip = arm(9, 8.0);
+    for (f, frame) in clip.frames.iter_mut().enumerate() {
+        let angle = (std::f64::consts::TAU * f as f64 / 8.0 + 0.7).sin();
+        frame[1].rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * angle);
+    }
+    let jump = |clip: &Clip| {
+        let at = |time: f64| clip.sample(time)[1].rotation.scaled_axis().x;
+        let step = 1e-4;
+        (at(1.0) - at(1.0 - step) - (at(step) - at(0.0))).abs() / step
+    };
+    assert!(jump(&clip) < 0.02, "{} rad/s", jump(&clip));
+    clip.loop_mode = LoopMode::Clamp;
+    assert!(jump(&clip) > 0.02, "{} rad/s", jump(&clip));
+}
+
 #[test]
 fn resampling_keeps_both_ends_and_the_loop() {
     let clip = arm(31, 30.0);
