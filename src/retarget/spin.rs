@@ -22,7 +22,7 @@ const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
 /// A flight that would have to be turned further is turned as far, and its spin changes by less than before. Radians.
-const FARTHEST: f64 = 0.5;
+const FARTHEST: f64 = 0.3;
 /// One that would have to be turned so far is meant to be as it is: its spin comes from elsewhere. Radians.
 const ELSEWHERE: f64 = 1.0;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
@@ -397,12 +397,13 @@ mod tests {
         };
         let angles = |turns: Turns| -> Vec<f64> { turns.iter().map(|t| t.angle()).collect() };
         let most = angles(within_reason(turns(0.9)).expect("turns"));
-        assert!((most[1] - 0.25).abs() < 1e-9 && (most[2] - 0.5).abs() < 1e-9);
-        assert_eq!(within_reason(turns(0.4)), Some(turns(0.4)));
+        assert!((most[1] - FARTHEST / 2.0).abs() < 1e-9 && (most[2] - FARTHEST).abs() < 1e-9);
+        let near = turns(0.9 * FARTHEST);
+        assert_eq!(within_reason(near.clone()), Some(near));
         assert_eq!(within_reason(turns(1.2)), None);
-        let told = |turned| problem(turned, turned < 0.5).map(|p| p.message.contains("is left"));
+        let told = |turned, all| problem(turned, all).map(|p| p.message.contains("is left"));
         assert_eq!(
-            [told(0.05), told(0.3), told(0.5)],
+            [told(0.05, true), told(0.3, true), told(0.3, false)],
             [None, Some(false), Some(true)]
         );
     }

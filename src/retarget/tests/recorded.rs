@@ -97,7 +97,7 @@ fn a_backflip_of_few_frames_falls_freely_and_spins_more_evenly() {
         (motion.fps, motion.qpos.len()),
         (64.0, 4 * (clip.frames.len() - 1) + 1)
     );
-    assert_falls_and_spins_freely(&motion, [0.72, 1.12], 24.0);
+    assert_falls_and_spins_freely(&motion, [0.72, 1.12], 36.0);
 }
 
 /// In its flight, but for the velocities of the frames next to the ground, the jump's centre of mass falls freely and its
