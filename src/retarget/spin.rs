@@ -349,9 +349,9 @@ mod tests {
             let duration = FLIES as f64 / FPS;
             qpos[2] += crate::motion::GRAVITY * duration * duration * u * (1.0 - u) / 2.0 - low;
             let wave = (std::f64::consts::PI * u).sin();
-            let root = UnitQuaternion::from_euler_angles(0.1 * wave, 0.2 * wave * wave, 0.6 * u);
+            let root = UnitQuaternion::from_euler_angles(0.05 * wave, 0.1 * wave * wave, 0.6 * u);
             put_quaternion(&mut qpos, 3, &root);
-            let swing = UnitQuaternion::from_euler_angles(0.0, -1.5 * wave, 0.0);
+            let swing = UnitQuaternion::from_euler_angles(0.0, -0.8 * wave, 0.0);
             put_quaternion(&mut qpos, at, &swing);
             qpos
         };
