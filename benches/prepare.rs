@@ -90,12 +90,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let skeleton = Skeleton::load("humanoid")?;
     let (mut frames, mut milliseconds) = (0, Vec::new());
     for clip in &clips {
+        let warm = retarget::retarget(clip, &skeleton, &retarget::Options::default())?;
+        frames += warm.motion.qpos.len();
         let rounds = (0..ROUNDS).map(|_| {
             time(|| retarget::retarget(clip, &skeleton, &retarget::Options::default()).is_ok()).0
         });
         milliseconds.push(median(rounds.collect()));
-        let done = retarget::retarget(clip, &skeleton, &retarget::Options::default())?;
-        frames += done.motion.qpos.len();
     }
     let total: f64 = milliseconds.iter().sum();
     println!(

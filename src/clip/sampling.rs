@@ -52,14 +52,6 @@ fn turn(now: &UnitQuaternion<f64>, slopes: [Vector3<f64>; 2], t: f64) -> UnitQua
     start.powf(shares[0]) * middle.powf(shares[1]) * end.powf(shares[2])
 }
 
-/// Slopes of a turn between others; even ones where one is so far that it may as well have gone the other way round.
-fn turning(steps: [Option<Vector3<f64>>; 3], now: Vector3<f64>) -> [Vector3<f64>; 2] {
-    if steps.iter().flatten().any(|step| step.norm() > WILD) {
-        return [now; 2];
-    }
-    slopes(steps[0], now, steps[2])
-}
-
 /// The turn from `a` to `b` in the frame of `a`, the short way round, as a rotation vector.
 fn turned(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> Vector3<f64> {
     (a.inverse() * b).scaled_axis()
@@ -158,8 +150,12 @@ impl Clip {
             now.0,
             in_place(out, frame + 2 <= last).map(|s| s.0),
         );
-        let turns = [into.map(|s| s.1), Some(now.1), out.map(|s| s.1)];
-        let turning = turning(turns, now.1);
+        let wild = [into, Some(now), out].into_iter().flatten();
+        let turning = if wild.map(|s| s.1.norm()).any(|angle| angle > WILD) {
+            [now.1; 2]
+        } else {
+            slopes(into.map(|s| s.1), now.1, out.map(|s| s.1))
+        };
         let by = UnitQuaternion::from_scaled_axis(now.1);
         Isometry3::from_parts(
             Translation3::from(a.translation.vector + way(now.0, moving, t)),

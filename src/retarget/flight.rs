@@ -434,7 +434,7 @@ mod tests {
         }
     }
 
-    /// It rises by a centimetre in 40 ms before it jumps: 20 of them are near enough to the ground to be either's.
+    /// It rises by a centimetre in 40 ms before it jumps, where it is near enough to the ground for a flight to begin.
     #[test]
     fn a_flight_begins_where_its_speed_does() {
         let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");

@@ -132,8 +132,8 @@ pub fn retarget(
     let (clip, own) = clip.with_margins();
     let wraps = clip.loop_mode == LoopMode::Wrap && clip.frames.len() > SHORTEST_CYCLE;
     let mut problems = clip.problems.clone();
-    problems.extend(rate::problem(&clip));
-    let (clip, own) = rate::often_enough(clip, own);
+    let (clip, own, few) = rate::often_enough(clip, own);
+    problems.extend(few);
     let clip = clip.as_ref();
     let alignment = align::align(clip, &map, skeleton)?;
     let model = Model::new(skeleton);
@@ -162,10 +162,9 @@ pub fn retarget(
         iterations,
         lifted,
         turned,
-        spins_freely,
     } = fit.run(&mut goals);
     problems.extend(flight::problem(lifted));
-    problems.extend(spin::problem(turned, spins_freely));
+    problems.extend(spin::problem(turned));
     goals.keep(&own);
     source.keep(&own);
     keep(&mut anchors, &own);

@@ -13,54 +13,39 @@ const MOST_TIMES: f64 = 8.0;
 /// … or makes more frames than this.
 const MOST_FRAMES: usize = 100_000;
 
-/// The clip, or one of more frames, and which of them are its own.
+/// The clip, or one of more frames, which of them are its own, and what there is to tell of that.
 pub(super) fn often_enough(
     clip: Cow<'_, Clip>,
     own: Range<usize>,
-) -> (Cow<'_, Clip>, Range<usize>) {
-    let times = times(&clip);
-    if times == 1 {
-        return (clip, own);
-    }
-    match clip.resample(clip.fps * times as f64) {
-        Ok(often) => {
-            let own = own.start * times..(own.end - 1) * times + 1;
-            (Cow::Owned(often), own)
-        }
-        Err(_) => (clip, own),
-    }
-}
-
-/// How many frames become of one.
-fn times(clip: &Clip) -> usize {
-    if clip.fps >= SLOW {
-        return 1;
+) -> (Cow<'_, Clip>, Range<usize>, Option<Problem>) {
+    let fps = clip.fps;
+    if fps >= SLOW {
+        return (clip, own, None);
     }
     // A part that isn't cut at frames has a rate that is nearly its whole's, and is to have as many.
-    let times = (OFTEN / clip.fps - 0.1).ceil().min(MOST_TIMES) as usize;
-    if clip.frames.len().saturating_mul(times) > MOST_FRAMES {
-        return 1;
+    let times = (OFTEN / fps - 0.1).ceil().min(MOST_TIMES) as usize;
+    let few = clip.frames.len().saturating_mul(times) <= MOST_FRAMES;
+    match few.then(|| clip.resample(fps * times as f64)) {
+        Some(Ok(often)) => {
+            let own = own.start * times..(own.end - 1) * times + 1;
+            let told = format!(
+                "{fps:.1} frames a second are few: the motion has {times} times as many, the ones in between along smooth curves"
+            );
+            (Cow::Owned(often), own, Some(problem(told)))
+        }
+        _ => {
+            let told = format!(
+                "{fps:.1} frames a second are few, and the clip is too long to make more of them: speeds in the motion are uncertain"
+            );
+            (clip, own, Some(problem(told)))
+        }
     }
-    times
 }
 
-/// Tells of the frames that a clip lacks.
-pub(super) fn problem(clip: &Clip) -> Option<Problem> {
-    let times = times(clip);
-    let message = match times {
-        1 if clip.fps < SLOW => format!(
-            "{:.1} frames a second are few, and the clip is too long to make more of them: speeds in the motion are uncertain",
-            clip.fps
-        ),
-        1 => return None,
-        _ => format!(
-            "{:.1} frames a second are few: the motion has {times} times as many, the ones in between along smooth curves",
-            clip.fps
-        ),
-    };
-    Some(Problem {
+fn problem(message: String) -> Problem {
+    Problem {
         id: "few-frames".to_owned(),
         severity: Severity::Note,
         message,
-    })
+    }
 }

@@ -5,9 +5,8 @@ use nalgebra::Vector3;
 
 /// Speed at which a standing point has a third of the say of one at rest in where it stands, leg lengths per second.
 const SLOW: f64 = 0.08;
-/// Distances from its place at which a standing point begins to go with the source, and does so wholly, leg lengths. The
-/// nearer they are to each other, the faster a foot that slides to its place goes the rest of the way.
-const SLIDES: [f64; 2] = [0.08, 0.2];
+/// Distances from its place at which a standing point begins to go with the source, and does so wholly, leg lengths.
+const SLIDES: [f64; 2] = [0.08, 0.14];
 /// Time at rest from whose mean the place of a stance follows, s.
 const LAST: f64 = 0.5;
 /// Time in which a stance takes hold of a point, and in which it lets go, s.

@@ -21,10 +21,8 @@ const LEFT: [f64; 2] = [1e-5, 1e-6];
 const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
-/// A flight that would have to be turned further is turned as far, and its spin changes by less than before. Radians.
-const FARTHEST: f64 = 0.3;
-/// One that would have to be turned so far is meant to be as it is: its spin comes from elsewhere. Radians.
-const ELSEWHERE: f64 = 1.0;
+/// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
+const FARTHEST: f64 = 0.5;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -56,52 +54,25 @@ impl Tilt {
 /// The turns of a flight, none in the first and the last.
 type Turns = Vec<UnitQuaternion<f64>>;
 
-/// How flights are turned.
-pub(super) struct Tilts {
-    /// By frame; `None` where it stays.
-    pub frames: Vec<Option<Tilt>>,
-    /// The flights that spin freely with that; the others were turned as far as is reasonable, or not at all.
-    pub free: Vec<Flight>,
-}
-
-/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin.
-pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Tilts {
-    let mut tilts = Tilts {
-        frames: vec![None; air.frames.len()],
-        free: Vec::new(),
-    };
+/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `None` where it
+/// stays.
+pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Vec<Option<Tilt>> {
+    let mut tilts = vec![None; air.frames.len()];
     for flight in flights {
         let (a, b) = flight.span;
         let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
-        let turns = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps));
-        let Some((needs, turns)) = turns.map(|turns| (farthest(&turns), turns)) else {
+        let Some(found) = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps)) else {
             continue;
         };
-        let Some(turns) = within_reason(turns) else {
-            continue;
-        };
-        if needs <= FARTHEST {
-            tilts.free.push(flight.clone());
-        }
-        for (index, tilt) in with_ends(air, flight, &turns) {
+        for (index, tilt) in with_ends(air, flight, &found) {
             if let Some((n, f)) = air.locate(index) {
                 let heading = air.offset(n).rotation;
                 let by = heading.inverse() * tilt.by * heading;
-                tilts.frames[f] = Some(Tilt { by, ..tilt });
+                tilts[f] = Some(Tilt { by, ..tilt });
             }
         }
     }
     tilts
-}
-
-/// As far as a flight may be turned.
-fn within_reason(turns: Turns) -> Option<Turns> {
-    let needs = farthest(&turns);
-    if needs <= FARTHEST {
-        return Some(turns);
-    }
-    let turns = turns.iter().map(|turn| turn.powf(FARTHEST / needs));
-    (needs < ELSEWHERE).then(|| turns.collect())
 }
 
 fn farthest(turns: &[UnitQuaternion<f64>]) -> f64 {
@@ -170,7 +141,8 @@ fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Turns> {
         frames,
         fps,
     };
-    toss.hit(kept(&steps(skeleton, frames, fps)?)?)
+    let turns = toss.hit(kept(&steps(skeleton, frames, fps)?)?)?;
+    (farthest(&turns) <= FARTHEST).then_some(turns)
 }
 
 /// The frames of a flight, and their rate.
@@ -310,18 +282,13 @@ pub(super) fn tilt_goals(
     }
 }
 
-/// Tells of flights that were turned far, and whether `all` of them spin freely now.
-pub(super) fn problem(turned: f64, all: bool) -> Option<Problem> {
-    let rest = if all {
-        ""
-    } else {
-        "; further it would be another motion, so some of that change is left"
-    };
+/// Tells of flights that were turned far.
+pub(super) fn problem(turned: f64) -> Option<Problem> {
     (turned > TOLD).then(|| Problem {
         id: "spin-corrected".to_owned(),
         severity: Severity::Note,
         message: format!(
-            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air{rest}; the distance from the source's joints has that in it",
+            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air; the distance from the source's joints has that in it",
             turned.to_degrees()
         ),
     })
@@ -349,9 +316,9 @@ mod tests {
             let duration = FLIES as f64 / FPS;
             qpos[2] += crate::motion::GRAVITY * duration * duration * u * (1.0 - u) / 2.0 - low;
             let wave = (std::f64::consts::PI * u).sin();
-            let root = UnitQuaternion::from_euler_angles(0.05 * wave, 0.1 * wave * wave, 0.6 * u);
+            let root = UnitQuaternion::from_euler_angles(0.1 * wave, 0.2 * wave * wave, 0.6 * u);
             put_quaternion(&mut qpos, 3, &root);
-            let swing = UnitQuaternion::from_euler_angles(0.0, -0.8 * wave, 0.0);
+            let swing = UnitQuaternion::from_euler_angles(0.0, -1.5 * wave, 0.0);
             put_quaternion(&mut qpos, at, &swing);
             qpos
         };
@@ -390,25 +357,6 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_is_turned_within_reason() {
-        let turns = |angle: f64| -> Turns {
-            let turn = |share: f64| UnitQuaternion::from_scaled_axis(Vector3::y() * angle * share);
-            [0.0, 0.5, 1.0, 0.0].map(turn).to_vec()
-        };
-        let angles = |turns: Turns| -> Vec<f64> { turns.iter().map(|t| t.angle()).collect() };
-        let most = angles(within_reason(turns(0.9)).expect("turns"));
-        assert!((most[1] - FARTHEST / 2.0).abs() < 1e-9 && (most[2] - FARTHEST).abs() < 1e-9);
-        let near = turns(0.9 * FARTHEST);
-        assert_eq!(within_reason(near.clone()), Some(near));
-        assert_eq!(within_reason(turns(1.2)), None);
-        let told = |turned, all| problem(turned, all).map(|p| p.message.contains("is left"));
-        assert_eq!(
-            [told(0.05, true), told(0.3, true), told(0.3, false)],
-            [None, Some(false), Some(true)]
-        );
-    }
-
-    #[test]
     fn the_momentum_of_a_flight_stays() {
         let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
         let still = leap(&skeleton);
@@ -422,7 +370,7 @@ mod tests {
         let (flights, _) = air.lifts();
         let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
         assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-        let found = tilts(&air, &flights).frames;
+        let found = tilts(&air, &flights);
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
             let Some(Tilt { by, flies }) = turned else {

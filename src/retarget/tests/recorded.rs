@@ -4,7 +4,6 @@ use super::super::*;
 use super::{clip, coordinate, data, humanoid, on_humanoid};
 use crate::humanoid::Slot;
 use crate::import;
-use crate::motion::Motion;
 use nalgebra::Isometry3;
 
 /// Whether a motion has human knees and elbows, its left on the left, and walks forward on alternating feet.
@@ -72,32 +71,30 @@ fn walks_of_several_rigs_walk() {
 
 #[test]
 fn acrobatics_of_the_same_proportions_stay_near_their_source() {
-    // No body flies as this backflip does: it has to be turned far.
-    for (file, keypoints) in [
-        ("kick", 0.025),
-        ("backflip", 0.06),
-        ("getup_facedown", 0.025),
-    ] {
+    for file in ["kick", "backflip", "getup_facedown"] {
         let Some(clip) = clip(&format!("deepmimic/humanoid3d_{file}.txt"), None) else {
             return;
         };
-        assert_good(&on_humanoid(&clip).report, keypoints, 0.03);
+        assert_good(&on_humanoid(&clip).report, 0.025, 0.03);
     }
 }
 
-/// The source has 16 frames a second, and an angular momentum that changes from 18 to 66 kg·m²/s in the air: more than can be
-/// mended.
+/// The source has 16 frames a second.
 #[test]
-fn a_backflip_of_few_frames_falls_freely_and_spins_more_evenly() {
+fn a_backflip_of_few_frames_falls_freely() {
     let Some(clip) = clip("deepmimic/humanoid3d_backflip.txt", None) else {
         return;
     };
     let motion = on_humanoid(&clip).motion;
-    assert_eq!(
-        (motion.fps, motion.qpos.len()),
-        (64.0, 4 * (clip.frames.len() - 1) + 1)
-    );
-    assert_falls_and_spins_freely(&motion, [0.72, 1.12], 36.0);
+    let frames = 4 * (clip.frames.len() - 1) + 1;
+    assert_eq!((motion.fps, motion.qpos.len()), (64.0, frames));
+    let at = |seconds: f64| (seconds * motion.fps).round() as usize;
+    let com = &motion.tracks.com;
+    for f in at(0.72)..at(1.12) {
+        let acceleration = (com[f + 1] - com[f] * 2.0 + com[f - 1]) * motion.fps.powi(2);
+        let off = acceleration + Vector3::z() * crate::motion::GRAVITY;
+        assert!(off.norm() < 0.05, "{f}: {off}");
+    }
 }
 
 /// In its flight, but for the velocities of the frames next to the ground, the jump's centre of mass falls freely and its
@@ -107,23 +104,24 @@ fn a_jump_falls_and_spins_freely() {
     let Some(clip) = clip("deepmimic/humanoid3d_jump.txt", None) else {
         return;
     };
-    assert_falls_and_spins_freely(&on_humanoid(&clip).motion, [0.85, 1.15], 0.2);
-}
-
-/// From `start` to `end`, s, with an angular momentum that changes by less than `most`, kg·m²/s.
-fn assert_falls_and_spins_freely(motion: &Motion, [start, end]: [f64; 2], most: f64) {
+    let motion = on_humanoid(&clip).motion;
     let at = |seconds: f64| (seconds * motion.fps).round() as usize;
-    let flight = at(start)..at(end);
+    let flight = at(0.85)..at(1.15);
     let momenta = &motion.tracks.angular_momentum[flight.clone()];
     for momentum in momenta {
-        let change = (momentum - momenta[0]).norm();
-        assert!(change < most, "{momentum} {}", momenta[0]);
+        assert!(
+            (momentum - momenta[0]).norm() < 0.2,
+            "{momentum} {}",
+            momenta[0]
+        );
     }
-    let com = &motion.tracks.com;
+    let velocity = &motion.tracks.com_velocity;
     for f in flight {
-        let acceleration = (com[f + 1] - com[f] * 2.0 + com[f - 1]) * motion.fps.powi(2);
-        let off = acceleration + Vector3::z() * crate::motion::GRAVITY;
-        assert!(off.norm() < 0.05, "{f}: {off}");
+        let acceleration = (velocity[f + 1] - velocity[f - 1]) * (motion.fps / 2.0);
+        assert!(
+            (acceleration + Vector3::z() * crate::motion::GRAVITY).norm() < 0.3,
+            "{f}"
+        );
     }
 }
 
