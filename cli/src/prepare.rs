@@ -25,6 +25,7 @@ pub struct Preparation {
     pub file: PathBuf,
     import: ImportArgs,
     retarget: RetargetArgs,
+    to_perform: bool,
 }
 
 impl Preparation {
@@ -33,7 +34,13 @@ impl Preparation {
             file,
             import: import.clone(),
             retarget: retarget.clone(),
+            to_perform: false,
         }
+    }
+
+    /// As in [`retarget::Options::to_perform`].
+    pub fn for_performance(self, to_perform: bool) -> Self {
+        Self { to_perform, ..self }
     }
 
     /// Name of what comes of it.
@@ -64,7 +71,11 @@ impl Preparation {
             skeleton.name
         ));
         let weights = self.retarget.weight.iter().copied().collect();
-        let options = retarget::Options { map, weights };
+        let options = retarget::Options {
+            map,
+            weights,
+            to_perform: self.to_perform,
+        };
         let done = retarget::retarget(&clip, &skeleton, &options)
             .map_err(|e| Failure::input(&self.file, e))?;
         let new = |problem: &&Problem| !clip.problems.contains(problem);

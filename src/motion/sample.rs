@@ -83,6 +83,28 @@ impl Motion {
         }
     }
 
+    /// Mean `qvel` of the frames' steps within `half` seconds on either side of `time`; at least of one step on either
+    /// side, which is [`Motion::sample_qvel`].
+    ///
+    /// # Panics
+    /// If the motion has no frames.
+    pub fn mean_qvel(&self, time: f64, half: f64) -> Vec<f64> {
+        // A frame's velocity is the mean of the steps to it and from it: every other frame has every step once.
+        let count = (half * self.fps).round().max(1.0) as usize;
+        let at = |i: usize| {
+            let time = time + (2.0 * i as f64 + 1.0 - count as f64) / self.fps;
+            match self.loop_mode {
+                LoopMode::Wrap => time,
+                LoopMode::Clamp => time.clamp(0.0, self.duration()),
+            }
+        };
+        let first = self.sample_qvel(at(0));
+        let rest = (1..count).map(|i| (i, self.sample_qvel(at(i))));
+        rest.fold(first, |mean, (i, next)| {
+            blend(&mean, &next, 1.0 / (i + 1) as f64)
+        })
+    }
+
     /// World poses of all bodies at `time`, each interpolated on its own.
     ///
     /// # Panics

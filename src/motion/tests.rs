@@ -103,6 +103,29 @@ fn velocities_pass_over_the_seam() {
 }
 
 #[test]
+fn a_mean_velocity_is_the_way_over_its_time() {
+    let s = humanoid();
+    let (fps, frames) = (60.0, 31);
+    let path = |f: usize| (f as f64 * 1.7).sin() + 0.1 * f as f64;
+    let mut qpos = vec![s.rest_qpos(); frames];
+    for (f, q) in qpos.iter_mut().enumerate() {
+        q[0] = path(f);
+    }
+    let motion = Motion::from_poses(&s, draft(&s, qpos, fps));
+    for (half, steps) in [(0.0, 1), (1.0 / 60.0, 1), (1.0 / 30.0, 2), (0.05, 3)] {
+        for f in steps..frames - steps {
+            let way = path(f + steps) - path(f - steps);
+            let expected = way * fps / (2 * steps) as f64;
+            let v = motion.mean_qvel(f as f64 / fps, half);
+            assert!((v[0] - expected).abs() < 1e-9, "frame {f}, {steps} steps");
+        }
+    }
+    let ends = [0.0, motion.duration()].map(|time| motion.mean_qvel(time, 1.0 / 30.0)[0]);
+    let near = |a: usize, b: usize| (motion.qvel[a][0] + motion.qvel[b][0]) / 2.0;
+    assert!((ends[0] - near(0, 1)).abs() < 1e-9 && (ends[1] - near(29, 30)).abs() < 1e-9);
+}
+
+#[test]
 fn one_sided_ends_are_of_second_order() {
     let s = humanoid();
     let mut qpos = vec![s.rest_qpos(); 9];

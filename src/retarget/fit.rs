@@ -6,7 +6,7 @@ use super::goals::Goals;
 use super::model::Model;
 use super::rotation;
 use super::solve::{self, Solver};
-use super::spin::{self, Tilt};
+use super::spin::{self, Tilt, Tilts};
 use super::stance::Anchor;
 use crate::motion::Cycle;
 use crate::skeleton::limits;
@@ -22,6 +22,8 @@ pub(super) struct Fit<'a> {
     pub anchors: &'a [Vec<Anchor>],
     pub cycle: Option<&'a Cycle>,
     pub fps: f64,
+    /// As in [`super::Options`].
+    pub to_perform: bool,
 }
 
 /// A trajectory, and what became of it.
@@ -33,6 +35,8 @@ pub(super) struct Fitted {
     pub lifted: f64,
     /// How far a flight was turned at most, radians.
     pub turned: f64,
+    /// Whether all flights keep their angular momentum.
+    pub spins_freely: bool,
 }
 
 impl<'a> Fit<'a> {
@@ -43,16 +47,19 @@ impl<'a> Fit<'a> {
         }
         let iterations = self.solver(&self.problem(goals)).run(&mut frames);
         let (flights, lifts) = self.air(&frames).lifts();
-        let mut tilts = Vec::new();
+        let mut tilts = Tilts {
+            frames: Vec::new(),
+            free: Vec::new(),
+        };
         if !flights.is_empty() {
             self.lift(goals, &lifts, &mut frames);
-            tilts = spin::tilts(&self.air(&frames), &flights);
-            self.tilt(goals, &tilts, &mut frames);
+            tilts = spin::tilts(&self.air(&frames), &flights, self.to_perform);
+            self.tilt(goals, &tilts.frames, &mut frames);
         }
         let problem = self.problem(goals);
         self.mend(&problem, &mut frames);
         if !flights.is_empty() {
-            self.set_free(&flights, &mut frames);
+            self.set_free(&flights, &tilts.free, &mut frames);
             // A flight that was freed may touch what it flew past.
             self.mend(&problem, &mut frames);
         }
@@ -62,13 +69,14 @@ impl<'a> Fit<'a> {
             frames.push(last);
         }
         let flying = lifts.iter().flatten().filter(|lift| lift.flies);
-        let turned = tilts.iter().flatten().filter(|tilt: &&Tilt| tilt.flies);
+        let turned = tilts.frames.iter().flatten().filter(|tilt| tilt.flies);
         let turned = turned.map(|tilt| tilt.by.angle());
         Fitted {
             frames,
             iterations,
             lifted: flying.map(|lift| lift.shift.norm()).fold(0.0, f64::max),
             turned: turned.fold(0.0, f64::max),
+            spins_freely: tilts.free.len() == flights.len(),
         }
     }
 
@@ -125,15 +133,16 @@ impl<'a> Fit<'a> {
         self.solver(&problem).mend(frames, leads);
     }
 
-    /// Fitting anew has moved flights off their parabolas again, by little: now they are moved and turned as they are.
-    fn set_free(&self, flights: &[Flight], frames: &mut [Vec<f64>]) {
+    /// Fitting anew has moved flights off their parabolas again, by little: now they are moved, and those that `spin` turned,
+    /// as they are.
+    fn set_free(&self, flights: &[Flight], spin: &[Flight], frames: &mut [Vec<f64>]) {
         let lifts = self.air(frames).lifts_of(flights);
         for (qpos, lift) in frames.iter_mut().zip(lifts) {
             if let Some(lift) = lift.filter(|lift| lift.flies) {
                 lift.apply(qpos);
             }
         }
-        let tilts = spin::tilts(&self.air(frames), flights);
+        let tilts = spin::tilts(&self.air(frames), spin, false).frames;
         for (qpos, tilt) in frames.iter_mut().zip(tilts) {
             if let Some(tilt) = tilt.filter(|tilt| tilt.flies) {
                 tilt.apply(self.model.skeleton, qpos);

@@ -57,6 +57,10 @@ pub struct Options {
     /// How much a slot's place and turn count, as a multiple of what they count by default: 0 to 100. Slots that are left
     /// out count once. What stands stands still whatever it counts.
     pub weights: BTreeMap<Slot, f64>,
+    /// Whether a body is to perform the motion. A flight whose spin changes with nothing to push on is turned to spin freely,
+    /// but left as it is where that takes more than half a radian; if this is set, it is turned by 0.3 radians then: a little
+    /// farther from its source, and nearer to what a body can do.
+    pub to_perform: bool,
 }
 
 /// Why a clip can't be carried onto a skeleton.
@@ -156,15 +160,17 @@ pub fn retarget(
         anchors: &anchors,
         cycle: cycle.as_ref(),
         fps: clip.fps,
+        to_perform: options.to_perform,
     };
     let Fitted {
         frames: mut qpos,
         iterations,
         lifted,
         turned,
+        spins_freely,
     } = fit.run(&mut goals);
     problems.extend(flight::problem(lifted));
-    problems.extend(spin::problem(turned));
+    problems.extend(spin::problem(turned, spins_freely));
     goals.keep(&own);
     source.keep(&own);
     keep(&mut anchors, &own);

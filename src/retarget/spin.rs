@@ -21,8 +21,12 @@ const LEFT: [f64; 2] = [1e-5, 1e-6];
 const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
-/// A flight that would have to be turned further is meant to be as it is: its spin comes from elsewhere. Radians.
+/// A flight that would have to be turned further stays as it is, or, for a body that is to perform it, … Radians.
 const FARTHEST: f64 = 0.5;
+/// … is turned by so much, and its spin changes by less than before, …
+const PART: f64 = 0.3;
+/// … unless it would have to be turned so far: then its spin comes from elsewhere.
+const ELSEWHERE: f64 = 1.0;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
 const LEADS: f64 = 2.0;
@@ -54,25 +58,53 @@ impl Tilt {
 /// The turns of a flight, none in the first and the last.
 type Turns = Vec<UnitQuaternion<f64>>;
 
-/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `None` where it
-/// stays.
-pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Vec<Option<Tilt>> {
-    let mut tilts = vec![None; air.frames.len()];
+/// How flights are turned.
+pub(super) struct Tilts {
+    /// By frame; `None` where it stays.
+    pub frames: Vec<Option<Tilt>>,
+    /// The flights that spin freely with that; the others were turned by a part of it, or not at all.
+    pub free: Vec<Flight>,
+}
+
+/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `to_perform` as in
+/// [`super::Options`].
+pub(super) fn tilts(air: &Air, flights: &[Flight], to_perform: bool) -> Tilts {
+    let mut tilts = Tilts {
+        frames: vec![None; air.frames.len()],
+        free: Vec::new(),
+    };
     for flight in flights {
         let (a, b) = flight.span;
         let frames: Option<Vec<_>> = (a..=b).map(|index| air.pose(index)).collect();
-        let Some(found) = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps)) else {
+        let turns = frames.and_then(|f| freely(air.model.skeleton, &f, air.fps));
+        let Some((needs, turns)) = turns.map(|turns| (farthest(&turns), turns)) else {
             continue;
         };
-        for (index, tilt) in with_ends(air, flight, &found) {
+        let Some(turns) = within_reason(turns, to_perform) else {
+            continue;
+        };
+        if needs <= FARTHEST {
+            tilts.free.push(flight.clone());
+        }
+        for (index, tilt) in with_ends(air, flight, &turns) {
             if let Some((n, f)) = air.locate(index) {
                 let heading = air.offset(n).rotation;
                 let by = heading.inverse() * tilt.by * heading;
-                tilts[f] = Some(Tilt { by, ..tilt });
+                tilts.frames[f] = Some(Tilt { by, ..tilt });
             }
         }
     }
     tilts
+}
+
+/// As far as a flight may be turned.
+fn within_reason(turns: Turns, to_perform: bool) -> Option<Turns> {
+    let needs = farthest(&turns);
+    if needs <= FARTHEST {
+        return Some(turns);
+    }
+    let turns = turns.iter().map(|turn| turn.powf(PART / needs));
+    (to_perform && needs < ELSEWHERE).then(|| turns.collect())
 }
 
 fn farthest(turns: &[UnitQuaternion<f64>]) -> f64 {
@@ -141,8 +173,7 @@ fn freely(skeleton: &Skeleton, frames: &[Vec<f64>], fps: f64) -> Option<Turns> {
         frames,
         fps,
     };
-    let turns = toss.hit(kept(&steps(skeleton, frames, fps)?)?)?;
-    (farthest(&turns) <= FARTHEST).then_some(turns)
+    toss.hit(kept(&steps(skeleton, frames, fps)?)?)
 }
 
 /// The frames of a flight, and their rate.
@@ -282,13 +313,18 @@ pub(super) fn tilt_goals(
     }
 }
 
-/// Tells of flights that were turned far.
-pub(super) fn problem(turned: f64) -> Option<Problem> {
+/// Tells of flights that were turned far, and whether `all` of them spin freely now.
+pub(super) fn problem(turned: f64, all: bool) -> Option<Problem> {
+    let rest = if all {
+        ""
+    } else {
+        "; further it would be another motion, so some of that change is left"
+    };
     (turned > TOLD).then(|| Problem {
         id: "spin-corrected".to_owned(),
         severity: Severity::Note,
         message: format!(
-            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air; the distance from the source's joints has that in it",
+            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air{rest}; the distance from the source's joints has that in it",
             turned.to_degrees()
         ),
     })
@@ -357,6 +393,28 @@ mod tests {
     }
 
     #[test]
+    fn a_flight_is_turned_within_reason() {
+        let turns = |angle: f64| -> Turns {
+            let turn = |share: f64| UnitQuaternion::from_scaled_axis(Vector3::y() * angle * share);
+            [0.0, 0.5, 1.0, 0.0].map(turn).to_vec()
+        };
+        let angles = |turns: Turns| -> Vec<f64> { turns.iter().map(|t| t.angle()).collect() };
+        let part = angles(within_reason(turns(0.9), true).expect("turns"));
+        assert!((part[1] - PART / 2.0).abs() < 1e-9 && (part[2] - PART).abs() < 1e-9);
+        for to_perform in [false, true] {
+            let near = turns(0.9 * FARTHEST);
+            assert_eq!(within_reason(near.clone(), to_perform), Some(near));
+            assert_eq!(within_reason(turns(1.2), to_perform), None);
+        }
+        assert_eq!(within_reason(turns(0.9), false), None);
+        let told = |turned, all| problem(turned, all).map(|p| p.message.contains("is left"));
+        assert_eq!(
+            [told(0.05, true), told(0.3, true), told(0.3, false)],
+            [None, Some(false), Some(true)]
+        );
+    }
+
+    #[test]
     fn the_momentum_of_a_flight_stays() {
         let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");
         let still = leap(&skeleton);
@@ -370,7 +428,7 @@ mod tests {
         let (flights, _) = air.lifts();
         let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
         assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-        let found = tilts(&air, &flights);
+        let found = tilts(&air, &flights, false).frames;
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
             let Some(Tilt { by, flies }) = turned else {

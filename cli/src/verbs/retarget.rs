@@ -27,6 +27,9 @@ pub struct Args {
     /// Motion to write, or a folder for it [default: NAME.motion in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
+    /// Turn flights whose spin no body could change so far in the air by a part of what they need, as `mimic train` does
+    #[arg(long)]
+    to_perform: bool,
     #[command(flatten)]
     retarget: RetargetArgs,
     #[command(flatten)]
@@ -36,7 +39,8 @@ pub struct Args {
 impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let file = locate::file_or_newest(self.clip.as_deref(), library, &locate::CLIPS, "clip")?;
-        let preparation = Preparation::new(file.clone(), &self.import, &self.retarget);
+        let preparation = Preparation::new(file.clone(), &self.import, &self.retarget)
+            .for_performance(self.to_perform);
         if preparation.is_motion() {
             return Err(Failure::input(
                 &file,

@@ -186,7 +186,7 @@ impl Args {
             if !locate::has_extension(&file, "motion") {
                 retarget.skeleton = retarget.skeleton.or(skeleton.map(str::to_owned));
             }
-            Preparation::new(file, &self.import, &retarget)
+            Preparation::new(file, &self.import, &retarget).for_performance(true)
         };
         Ok(files.into_iter().map(prepare).collect())
     }

@@ -144,6 +144,7 @@ fn distance_of_hand(weight: f64) -> f64 {
         anchors: &vec![Vec::new(); clip.frames.len()],
         cycle: None,
         fps: clip.fps,
+        to_perform: false,
     };
     let fitted = fit.run(&mut goals);
     let apart = fitted.frames.iter().zip(&goals.points).map(|(qpos, goal)| {

@@ -117,23 +117,23 @@ fn another_motion_begins_where_the_one_before_has_led() {
     );
 }
 
-/// A walk goes over into itself at twice the speed: that begins at half its pace, so nothing slides, gathers speed within
+/// A walk at half its speed goes over into itself as it is: that begins at half its pace, so nothing slides, gathers speed within
 /// a second, and always moves as it says.
 #[test]
 fn a_faster_motion_begins_at_the_pace_of_the_slower_one() {
     let stage = stage();
     let walk = motion("walk.glb", Some(LoopMode::Wrap));
-    let mut fast = walk.clone();
-    fast.fps *= 2.0;
-    fast.qvel.iter_mut().flatten().for_each(|v| *v *= 2.0);
-    let [walk, fast] = [walk, fast].map(|m| Reference::new(&m, &stage).expect("a reference"));
-    let (mut present, mut begun) = (walk.blank(), fast.blank());
-    walk.sample(0.4, &mut present);
-    fast.sample(0.2, &mut begun);
-    let transition = Transition::between(&stage.character, &present, &begun, 0.2);
+    let mut slow = walk.clone();
+    slow.fps /= 2.0;
+    slow.qvel.iter_mut().flatten().for_each(|v| *v /= 2.0);
+    let [slow, fast] = [slow, walk].map(|m| Reference::new(&m, &stage).expect("a reference"));
+    let (mut present, mut begun) = (slow.blank(), fast.blank());
+    slow.sample(0.8, &mut present);
+    fast.sample(0.4, &mut begun);
+    let transition = Transition::between(&stage.character, &present, &begun, 0.4);
     let begins = transition.at(0.0);
     assert!((begins.pace - 0.5).abs() < 1e-3, "{}", begins.pace);
-    assert!(begins.velocity.norm() < 1e-3, "{}", begins.velocity);
+    assert!(begins.velocity.norm() < 5e-4, "{}", begins.velocity);
     let led = |passed: f64| {
         let mut sample = fast.blank();
         fast.sample_at(
@@ -163,7 +163,7 @@ fn a_faster_motion_begins_at_the_pace_of_the_slower_one() {
             let own = amiss([first, time, last].map(alone), last - first, i);
             let found = amiss(times.map(led), 2.0 * step, i);
             assert!(
-                (found - pace * own).abs() < 0.02,
+                (found - pace * own).abs() < 0.01,
                 "{found}, {own} of {i} at {passed}"
             );
         }
@@ -172,12 +172,12 @@ fn a_faster_motion_begins_at_the_pace_of_the_slower_one() {
         let left = (1.0 - passed).max(0.0).powi(2);
         let expected = own * (1.0 - 0.5 * left as f32);
         assert!(
-            (speed - expected).abs() < 0.01,
+            (speed - expected).abs() < 0.005,
             "{speed} m/s, not {expected}"
         );
     }
     assert_eq!(transition.at(1.0).pace, 1.0);
-    let gained = transition.clock().time(1.0) - 0.2;
+    let gained = transition.clock().time(1.0) - 0.4;
     assert!((gained - (1.0 - 0.5 / 3.0)).abs() < 1e-6, "{gained} s");
 }
 
