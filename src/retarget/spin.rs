@@ -21,11 +21,12 @@ const LEFT: [f64; 2] = [1e-5, 1e-6];
 const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to see what that gives.
 const VARIED: f64 = 1e-3;
-/// A flight that would have to be turned further stays as it is, or, for a body that is to perform it, … Radians.
+/// A flight that would have to be turned further is another motion then, and stays as it is. Radians.
 const FARTHEST: f64 = 0.5;
-/// … is turned by so much, and its spin changes by less than before, …
+/// By how much such a flight is turned for a body that is to perform it: with more of it DeepMimic's backflip comes down too
+/// fast to stand. Radians.
 const PART: f64 = 0.3;
-/// … unless it would have to be turned so far: then its spin comes from elsewhere.
+/// From here on not even that helps: the spin comes from elsewhere. Radians.
 const ELSEWHERE: f64 = 1.0;
 /// How much faster than the whole body what doesn't stand turns, before a flight and after it: trunk, arms and head have
 /// about half of the body's inertia.
@@ -97,7 +98,7 @@ pub(super) fn tilts(air: &Air, flights: &[Flight], to_perform: bool) -> Tilts {
     tilts
 }
 
-/// As far as a flight may be turned.
+/// The turns that a flight gets of those that it needs.
 fn within_reason(turns: Turns, to_perform: bool) -> Option<Turns> {
     let needs = farthest(&turns);
     if needs <= FARTHEST {
@@ -318,7 +319,7 @@ pub(super) fn problem(turned: f64, all: bool) -> Option<Problem> {
     let rest = if all {
         ""
     } else {
-        "; further it would be another motion, so some of that change is left"
+        "; where it takes more than that, some of the change is left"
     };
     (turned > TOLD).then(|| Problem {
         id: "spin-corrected".to_owned(),

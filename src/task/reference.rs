@@ -12,9 +12,9 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 /// Link states between the table's frames are blended link by link, which shortens a limb that turns at ω by
 /// 1 − cos(ω/2f): at 120 Hz and 12 rad/s by a half per mille, in a table of a clip's own 16 Hz by 7 %.
 const TABLE_HZ: f64 = 120.0;
-/// The reference's velocities are means over so long on either side, s, a step of control: what comes and goes in less can't
-/// be followed, and in recordings is mostly noise.
-const WITHIN: f64 = 1.0 / 30.0;
+/// The reference's velocities are means over so long on either side, seconds: what comes and goes within a step of control
+/// can't be followed, and in recordings is mostly noise.
+const AVERAGED: f64 = 1.0 / 30.0;
 /// Frames a second that [`Reference::distance`] looks at.
 const LOOKED_AT_HZ: f64 = 30.0;
 
@@ -246,7 +246,7 @@ pub(super) fn heading(turn: &UnitQuaternion<f32>) -> UnitQuaternion<f32> {
 fn link_states(motion: &Motion, stage: &Stage, time: f64) -> Vec<LinkState> {
     let skeleton = &stage.skeleton;
     let qpos = motion.sample_qpos(skeleton, time);
-    let qvel = motion.mean_qvel(time, WITHIN);
+    let qvel = motion.mean_qvel(time, AVERAGED);
     stage.character.states(skeleton, &qpos, &qvel)
 }
 
