@@ -18,9 +18,10 @@ import mujoco
 import numpy as np
 from safetensors import safe_open
 
-# As in src/task/reference.rs, src/task/imitate.rs and src/learn: rate of the reference's table, how far beyond its range
-# a hinge may be aimed, and where normalised observations are cut off.
+# As in src/task/reference.rs, src/task/imitate.rs and src/learn: rate of the reference's table, over how long on either
+# side its velocities are means, how far beyond its range a hinge may be aimed, and where normalised observations are cut off.
 TABLE_HZ = 120.0
+AVERAGED_S = 1.0 / 30.0
 BEYOND_LIMIT = 0.5
 OBSERVATION_LIMIT = 10.0
 SMALLEST_DEVIATION = 1e-4
@@ -130,10 +131,25 @@ class Reference:
             mujoco.mj_differentiatePos(model, change, 1.0, qpos[frame], qpos[frame + 1])
             data.qpos[:] = qpos[frame]
             mujoco.mj_integratePos(model, data.qpos, change, share)
-            data.qvel[:] = qvel[frame] + (qvel[frame + 1] - qvel[frame]) * share
+            data.qvel[:] = self.velocity(qvel, fps, row / self.rate)
             mujoco.mj_forward(model, data)
             self.frames.append(Bodies.of(model, data))
             self.contacts.append(tensors["contact"][frame + (share >= 0.5)].astype(bool))
+
+    def velocity(self, qvel, fps, time):
+        """Mean of the steps between frames around a time; `qvel` is the mean of the two at a frame."""
+        count = max(1, int(np.floor(AVERAGED_S * fps + 0.5)))
+        return np.mean([self.momentary(qvel, fps, time + (2 * i + 1 - count) / fps) for i in range(count)], 0)
+
+    def momentary(self, qvel, fps, time):
+        if not self.loops:
+            time = min(max(time, 0.0), self.duration)
+        n = np.floor(time / self.duration) if self.loops else 0
+        at = (time - n * self.duration) * fps
+        frame = min(max(int(at), 0), len(qvel) - 2)
+        found = qvel[frame] + (qvel[frame + 1] - qvel[frame]) * (at - frame)
+        found[:3] = rotate(self.offset(n)[1], found[:3])
+        return found
 
     def split(self, time):
         if not self.loops:

@@ -245,12 +245,22 @@ impl Axis {
         (0..)
             .map(|n| (first + f64::from(n)) * step + 0.0)
             .take_while(|value| *value <= high + 1e-9 * step)
-            .map(|value| (value, number(value)))
+            .map(|value| (value, mark(value, step)))
             .collect()
     }
 }
 
-/// Three digits are more than ticks need.
+/// As [`number`], but with all the digits that tell it from the next, a `step` away.
+fn mark(value: f64, step: f64) -> String {
+    let short = number(value);
+    if short != number(value + step) && short != number(value - step) {
+        return short;
+    }
+    let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.digits$}")
+}
+
+/// Three digits are enough for most numbers.
 fn number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
@@ -305,6 +315,9 @@ mod tests {
         assert!((log.share(1e-3) - 0.5).abs() < 1e-12);
         let labels: Vec<String> = log.ticks().into_iter().map(|(_, label)| label).collect();
         assert_eq!(labels, ["1e-4", "0.001", "0.01"]);
+        let close = axis(Scale::Linear, &[0.96963, 0.96974]).ticks();
+        let labels: Vec<String> = close.into_iter().map(|(_, label)| label).collect();
+        assert_eq!(labels, ["0.96965", "0.96970"]);
         let empty = axis(Scale::Linear, &[]).ticks();
         let labels: Vec<String> = empty.into_iter().map(|(_, label)| label).collect();
         assert_eq!(labels, ["0", "0.5", "1"], "30 pixels of 150 apart at least");
