@@ -53,7 +53,7 @@ impl<'a> Fit<'a> {
         };
         if !flights.is_empty() {
             self.lift(goals, &lifts, &mut frames);
-            tilts = spin::tilts(&self.air(&frames), &flights, self.to_perform);
+            tilts = spin::tilts(&self.air(&frames), &flights);
             self.tilt(goals, &tilts.frames, &mut frames);
         }
         let problem = self.problem(goals);
@@ -104,6 +104,7 @@ impl<'a> Fit<'a> {
             anchors: self.anchors,
             cycle: self.cycle,
             fps: self.fps,
+            to_perform: self.to_perform,
         }
     }
 
@@ -142,7 +143,7 @@ impl<'a> Fit<'a> {
                 lift.apply(qpos);
             }
         }
-        let tilts = spin::tilts(&self.air(frames), spin, false).frames;
+        let tilts = spin::tilts(&self.air(frames), spin).frames;
         for (qpos, tilt) in frames.iter_mut().zip(tilts) {
             if let Some(tilt) = tilt.filter(|tilt| tilt.flies) {
                 tilt.apply(self.model.skeleton, qpos);

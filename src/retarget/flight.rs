@@ -62,6 +62,8 @@ pub(super) struct Air<'a> {
     pub anchors: &'a [Vec<Anchor>],
     pub cycle: Option<&'a Cycle>,
     pub fps: f64,
+    /// As in [`super::Options`].
+    pub to_perform: bool,
 }
 
 /// A flight.
@@ -183,7 +185,8 @@ impl Air<'_> {
     }
 
     /// The longest flight in which a body that falls and spins freely takes over hardly less of its speed, where it leaves the
-    /// ground and where it comes down, than in any other; `None` if there is no flight.
+    /// ground and where it comes down, than in any other; `None` if there is no flight. The longest of all for a body that is to
+    /// perform it: it has to have the flight's spin by the time of its last push, which is before the source's speed changes.
     fn meant(&self, flight: &Flight, com: &[Vector3<f64>]) -> Option<Flight> {
         let widest = flight.lengths().next()?.span;
         let spins = spin::Spins::new(self, widest);
@@ -201,7 +204,7 @@ impl Air<'_> {
         let least = least.fold(f64::INFINITY, f64::min);
         let smooth = all
             .into_iter()
-            .filter(|(jolt, _)| *jolt <= JOLTS * least + SMOOTH);
+            .filter(|(jolt, _)| self.to_perform || *jolt <= JOLTS * least + SMOOTH);
         let lasts = |flight: &Flight| flight.span.1 - flight.span.0;
         let longest = smooth
             .max_by(|(jolt, a), (other, b)| lasts(a).cmp(&lasts(b)).then(other.total_cmp(jolt)));
@@ -363,6 +366,7 @@ mod tests {
             anchors: &vec![Vec::new(); frames.len()],
             cycle,
             fps: FPS,
+            to_perform: false,
         };
         air.lifts().1
     }
@@ -461,15 +465,29 @@ mod tests {
             anchors: &vec![Vec::new(); frames.len()],
             cycle: None,
             fps,
+            to_perform: false,
         };
-        let (flights, _) = air.lifts();
-        let starts: Vec<i64> = flights.iter().map(|flight| flight.span.0).collect();
+        let starts = |air: &Air| -> Vec<i64> {
+            let (flights, _) = air.lifts();
+            flights.iter().map(|flight| flight.span.0).collect()
+        };
+        let takes_off = takes_off as i64;
+        let found = starts(&air);
         assert!(
-            matches!(starts[..], [start] if start >= takes_off as i64),
-            "{starts:?} {takes_off}"
+            matches!(found[..], [start] if start >= takes_off),
+            "{found:?} {takes_off}"
         );
         let low: Vec<f64> = (0..frames.len()).map(height).collect();
-        assert!(air.flights(&low)[0].near[0] > 2, "they are near");
+        let first = &air.flights(&low)[0];
+        assert!(first.near[0] > 2, "they are near");
+        // Who is to perform it has left the ground by then.
+        let earliest = first.span.0 - first.near[0];
+        assert!(earliest < takes_off, "{earliest} {takes_off}");
+        let performed = Air {
+            to_perform: true,
+            ..air
+        };
+        assert_eq!(starts(&performed), [earliest]);
     }
 
     #[test]

@@ -57,9 +57,10 @@ pub struct Options {
     /// How much a slot's place and turn count, as a multiple of what they count by default: 0 to 100. Slots that are left
     /// out count once. What stands stands still whatever it counts.
     pub weights: BTreeMap<Slot, f64>,
-    /// Whether a body is to perform the motion. A flight whose spin changes with nothing to push on is turned to spin freely,
-    /// but left as it is where that takes more than half a radian; if this is set, it is turned by 0.3 radians then: a little
-    /// farther from its source, and nearer to what a body can do.
+    /// Whether a body is to perform the motion: a little farther from its source, and nearer to what a body can do. Flights
+    /// then begin as early and end as late as they can, so that a body's last push has their spin in it. And a flight whose
+    /// spin changes with nothing to push on, which is turned to spin freely but left as it is where that takes more than half
+    /// a radian, is turned by 0.3 radians then.
     pub to_perform: bool,
 }
 

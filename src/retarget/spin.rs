@@ -67,9 +67,8 @@ pub(super) struct Tilts {
     pub free: Vec<Flight>,
 }
 
-/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin; `to_perform` as in
-/// [`super::Options`].
-pub(super) fn tilts(air: &Air, flights: &[Flight], to_perform: bool) -> Tilts {
+/// How every frame is to be turned so that its flight spins freely, and begins and ends with that spin.
+pub(super) fn tilts(air: &Air, flights: &[Flight]) -> Tilts {
     let mut tilts = Tilts {
         frames: vec![None; air.frames.len()],
         free: Vec::new(),
@@ -81,7 +80,7 @@ pub(super) fn tilts(air: &Air, flights: &[Flight], to_perform: bool) -> Tilts {
         let Some((needs, turns)) = turns.map(|turns| (farthest(&turns), turns)) else {
             continue;
         };
-        let Some(turns) = within_reason(turns, to_perform) else {
+        let Some(turns) = within_reason(turns, air.to_perform) else {
             continue;
         };
         if needs <= FARTHEST {
@@ -425,11 +424,12 @@ mod tests {
             anchors: &vec![Vec::new(); still.len()],
             cycle: None,
             fps: FPS,
+            to_perform: false,
         };
         let (flights, _) = air.lifts();
         let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
         assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-        let found = tilts(&air, &flights, false).frames;
+        let found = tilts(&air, &flights).frames;
         let mut frames = still.clone();
         for (qpos, turned) in frames.iter_mut().zip(&found) {
             let Some(Tilt { by, flies }) = turned else {

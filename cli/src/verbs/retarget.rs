@@ -27,7 +27,8 @@ pub struct Args {
     /// Motion to write, or a folder for it [default: NAME.motion in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Turn flights whose spin no body could change so far in the air by a part of what they need, as `mimic train` does
+    /// Flights nearer to what a body can do, as `mimic train` asks them: as long as they can be, and turned by a part of what
+    /// they need where that is too much
     #[arg(long)]
     to_perform: bool,
     #[command(flatten)]

@@ -157,6 +157,26 @@ fn a_jump_falls_and_spins_freely() {
     }
 }
 
+/// At 44 % of the jump its toes push for the last time, against the source's forward spin: who is to perform it has most of
+/// the flight's own then.
+#[test]
+fn a_jump_has_its_spin_with_the_last_push_of_a_body_that_performs_it() {
+    let Some(clip) = clip("deepmimic/humanoid3d_jump.txt", None) else {
+        return;
+    };
+    let [kept, early] = [false, true].map(|to_perform| {
+        let options = Options {
+            to_perform,
+            ..Options::default()
+        };
+        let motion = retarget(&clip, &humanoid(), &options).unwrap().motion;
+        let at = |share: f64| (share * motion.qpos.len() as f64).round() as usize;
+        let momenta = &motion.tracks.angular_momentum;
+        (momenta[at(0.44)] - momenta[at(0.56)]).norm()
+    });
+    assert!(early < 0.6 * kept, "{early} of {kept} kg·m²/s");
+}
+
 /// The loop of this run lacks 4 cm of the right foot's height, in the midst of its stance.
 #[test]
 fn a_foot_stands_over_a_seam_that_does_not_close() {
