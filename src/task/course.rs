@@ -75,8 +75,8 @@ impl Course {
         }
     }
 
-    /// Slows down for another `reference`, if that is slower, and goes over into it at the step, of `dt` seconds, of the next second at which the present one comes
-    /// nearest to it; at once where the present one ends.
+    /// Slows down for another `reference`, if that is slower, and goes over into it at the step, of `dt` seconds, of the next
+    /// second at which the present one comes nearest to it; at once where the present one ends.
     pub fn lead_to(&mut self, reference: &Arc<Reference>, dt: f64) {
         let mut sample = self.reference.blank();
         self.sample(0.0, &mut sample);

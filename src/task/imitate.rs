@@ -44,6 +44,8 @@ pub struct Imitate {
     elapsed: f64,
     /// The reference at the next control step.
     next: Sample,
+    /// The reference at each moment of [`super::Observations::ahead`].
+    ahead: Vec<Sample>,
     dynamics: Dynamics,
     targets: Vec<Target>,
     last_action: Vec<f32>,
@@ -57,6 +59,7 @@ impl Imitate {
         let mut env = Imitate {
             world: World::new(&stage.character, setting.physics),
             next: reference.blank(),
+            ahead: vec![reference.blank(); setting.observations.ahead().len()],
             targets: vec![Target::Free; stage.character.links.len()],
             last_action: vec![0.0; stage.character.dof],
             touching: Vec::new(),
@@ -89,8 +92,8 @@ impl Imitate {
     }
 
     /// Slows the present reference down for another `reference`, if that is slower, and goes over into it, as by
-    /// [`Imitate::change_to`], at the control step of the next second at which
-    /// the present one comes nearest to it; at once where the present one ends.
+    /// [`Imitate::change_to`], at the control step of the next second at which the present one comes nearest to it; at once
+    /// where the present one ends.
     pub fn lead_to(&mut self, reference: &Arc<Reference>) {
         self.course
             .lead_to(reference, self.setting.physics.control_dt());
@@ -218,6 +221,7 @@ impl Imitate {
             contacts: &self.touching,
             last_action: &self.last_action,
             next: &self.next,
+            ahead: &self.ahead,
         };
         observe(self.setting.observations, &self.stage, &scene, out);
     }
@@ -359,11 +363,12 @@ impl Imitate {
     }
 
     fn look_ahead(&mut self) {
-        // Taken out for the moment, so that its room is used again.
-        let mut next = std::mem::take(&mut self.next);
-        self.course
-            .sample(self.setting.physics.control_dt(), &mut next);
-        self.next = next;
+        let dt = self.setting.physics.control_dt();
+        self.course.sample(dt, &mut self.next);
+        let ahead = self.setting.observations.ahead();
+        for (seconds, sample) in ahead.iter().zip(&mut self.ahead) {
+            self.course.sample(dt + seconds, sample);
+        }
     }
 
     fn outcome(&self, reward: f32) -> Outcome {

@@ -35,10 +35,22 @@ pub enum Observations {
     /// Our own: the agent, its errors against the reference, and the phase, in the root's frame.
     #[default]
     Tracking,
+    /// The same, and where the reference is going: its root, joints and contacts 0.1 and 0.3 s after the next control step.
+    TrackingAhead,
     /// Peng et al. 2018, "DeepMimic", section 4: all bodies in the heading frame, and the phase.
     Deepmimic,
     /// Booth & Ivanov 2020: all bodies, the last action, the centre of mass, angular momentum, soles, and the phase.
     Booth2020,
+}
+
+impl Observations {
+    /// The moments of the reference that are seen beside the next control step's, seconds after it.
+    pub fn ahead(self) -> &'static [f64] {
+        match self {
+            Observations::TrackingAhead => &[0.1, 0.3],
+            _ => &[],
+        }
+    }
 }
 
 /// Weights of the reward terms; what a step earns is divided by their sum. See [`super::Terms`].

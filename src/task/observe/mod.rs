@@ -31,12 +31,16 @@ pub struct Scene<'a> {
     pub last_action: &'a [f32],
     /// The reference at the next control step.
     pub next: &'a Sample,
+    /// The reference at each moment of [`Observations::ahead`].
+    pub ahead: &'a [Sample],
 }
 
 /// The blocks of an observation in order, for a motion with `contacts` contact bodies.
 pub fn layout(kind: Observations, stage: &Stage, contacts: usize) -> Vec<Block> {
     let blocks = match kind {
-        Observations::Tracking => tracking::layout(stage, contacts),
+        Observations::Tracking | Observations::TrackingAhead => {
+            tracking::layout(stage, contacts, kind.ahead().len())
+        }
         Observations::Deepmimic => deepmimic::layout(stage),
         Observations::Booth2020 => booth::layout(stage),
     };
@@ -54,7 +58,9 @@ pub fn observation_size(kind: Observations, stage: &Stage, contacts: usize) -> u
 pub fn observe(kind: Observations, stage: &Stage, scene: &Scene, out: &mut [f32]) {
     let mut w = Writer { out, at: 0 };
     match kind {
-        Observations::Tracking => tracking::observe(stage, scene, &mut w),
+        Observations::Tracking | Observations::TrackingAhead => {
+            tracking::observe(stage, scene, &mut w);
+        }
         Observations::Deepmimic => deepmimic::observe(stage, scene, &mut w),
         Observations::Booth2020 => booth::observe(stage, scene, &mut w),
     }

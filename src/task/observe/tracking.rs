@@ -5,9 +5,10 @@ use crate::sim::LinkState;
 use crate::task::Stage;
 use nalgebra::{UnitQuaternion, Vector3};
 
-pub(super) fn layout(stage: &Stage, contacts: usize) -> Vec<(&'static str, usize)> {
+/// With `ahead` moments of the reference to come.
+pub(super) fn layout(stage: &Stage, contacts: usize, ahead: usize) -> Vec<(&'static str, usize)> {
     let dof = stage.character.dof;
-    vec![
+    let mut blocks = vec![
         ("root_height", 1),
         ("up", 3),
         ("root_velocity", 3),
@@ -27,7 +28,16 @@ pub(super) fn layout(stage: &Stage, contacts: usize) -> Vec<(&'static str, usize
         ("root_angular_velocity_error", 3),
         ("reference_contact", contacts),
         ("phase", 5),
-    ]
+    ];
+    for _ in 0..ahead {
+        blocks.extend([
+            ("ahead_root_position", 3),
+            ("ahead_root_rotation", 3),
+            ("ahead_joint_rotation", dof),
+            ("ahead_contact", contacts),
+        ]);
+    }
+    blocks
 }
 
 pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
@@ -36,6 +46,7 @@ pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
         dynamics,
         contacts,
         next,
+        ahead,
         ..
     } = *scene;
     let root = &links[0];
@@ -76,6 +87,15 @@ pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
         (2.0 * turn).cos(),
     ] {
         w.one(value);
+    }
+    for sample in ahead {
+        let coming = &sample.links[0].pose;
+        w.vector(into_root(coming.translation.vector - center));
+        w.vector((root.pose.rotation.inverse() * coming.rotation).scaled_axis());
+        joints(stage, w, |i, p| {
+            relative(stage, &sample.links, i, p).scaled_axis()
+        });
+        w.flags(&sample.contacts);
     }
 }
 

@@ -55,13 +55,15 @@ fn seen(kind: Observations, links: &[LinkState], next: &Sample, contacts: &[bool
         contacts,
         last_action: &last_action,
         next,
+        ahead: &vec![next.clone(); kind.ahead().len()],
     };
     observe(kind, &stage, &scene, &mut out);
     out
 }
 
-const ALL: [Observations; 3] = [
+const ALL: [Observations; 4] = [
     Observations::Tracking,
+    Observations::TrackingAhead,
     Observations::Deepmimic,
     Observations::Booth2020,
 ];
@@ -218,6 +220,37 @@ fn an_agent_on_its_reference_sees_no_error() {
         out[start..start + now.contacts.len()].to_vec()
     };
     assert_eq!(flags("contact"), flags("reference_contact"));
+}
+
+/// At the end of what is seen are the joints of 0.1 s and 0.3 s after the next control step, each between the root's place and
+/// turn and the contacts.
+#[test]
+fn what_comes_is_seen() {
+    let setting = Setting {
+        observations: Observations::TrackingAhead,
+        ..Setting::default()
+    };
+    let mut env = environment_of("kick.fbx", None, setting);
+    env.reset(0.4);
+    let mut out = vec![0.0; env.observation_size()];
+    env.observe(&mut out);
+    let (dof, contacts) = (env.action_size(), env.touching().len());
+    let size = 6 + dof + contacts;
+    let coming = &out[out.len() - 2 * size..];
+    for (moment, after) in coming.chunks(size).zip([0.1, 0.3]) {
+        let then = sample(0.4 + setting.physics.control_dt() + after);
+        let kind = Observations::Tracking;
+        let there = seen(kind, &then.links, &then, &then.contacts);
+        let turns = block(kind, &there, "joint_rotation");
+        let apart = moment[6..6 + dof]
+            .iter()
+            .zip(&turns)
+            .map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f32::max) < 1e-4, "{after}");
+        let way = then.links[0].pose.translation.vector - env.states()[0].pose.translation.vector;
+        let seen = Vector3::from_column_slice(&moment[..3]);
+        assert!((seen.norm() - way.norm()).abs() < 1e-4, "{seen} {way}");
+    }
 }
 
 #[test]
