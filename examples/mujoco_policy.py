@@ -10,6 +10,7 @@ reference, and says how it ended; exits 1 if it fell. For policies of the defaul
 """
 
 import argparse
+import functools
 import json
 import pathlib
 import sys
@@ -18,10 +19,13 @@ import mujoco
 import numpy as np
 from safetensors import safe_open
 
-# As in src/task/reference.rs, src/task/imitate.rs and src/learn: rate of the reference's table, over how long on either
-# side its velocities are means, how far beyond its range a hinge may be aimed, and where normalised observations are cut off.
+# As in src/task/reference.rs, src/motion/sample.rs, src/task/imitate.rs and src/learn: rate of the reference's table, over how
+# long on either side its velocities are means, the acceleration, less gravity, below which it falls freely (m/s^2), how far
+# beyond its range a hinge may be aimed, and where normalised observations are cut off.
 TABLE_HZ = 120.0
 AVERAGED_S = 1.0 / 30.0
+FREELY = 1.0
+GRAVITY = np.array([0.0, 0.0, -9.81])
 BEYOND_LIMIT = 0.5
 OBSERVATION_LIMIT = 10.0
 SMALLEST_DEVIATION = 1e-4
@@ -124,6 +128,7 @@ class Reference:
         finer = max(1, int(np.ceil(TABLE_HZ / fps)))
         self.rate = fps * finer
         data, change = mujoco.MjData(model), np.zeros(model.nv)
+        self.falls = self.falling(model, data, qpos, fps)
         self.frames, self.contacts = [], []
         for row in range((len(qpos) - 1) * finer + 1):
             frame = min(row // finer, len(qpos) - 2)
@@ -136,9 +141,34 @@ class Reference:
             self.frames.append(Bodies.of(model, data))
             self.contacts.append(tensors["contact"][frame + (share >= 0.5)].astype(bool))
 
+    def falling(self, model, data, qpos, fps):
+        """Frames, by number in any cycle, in which the centre of mass falls freely from the one before to the one after."""
+        com = []
+        for data.qpos[:] in qpos:
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            com.append(data.subtree_com[0].copy())
+
+        def at(frame):
+            n, f = divmod(frame, len(com) - 1) if self.loops else (0, frame)
+            shift, turn = self.offset(n)
+            return shift + rotate(turn, com[f])
+
+        def falls(frame):
+            if not self.loops and not 0 < frame < len(com) - 1:
+                return False
+            acceleration = (at(frame - 1) - 2.0 * at(frame) + at(frame + 1)) * fps**2
+            return bool(np.linalg.norm(acceleration - GRAVITY) < FREELY)
+
+        return functools.cache(falls)
+
     def velocity(self, qvel, fps, time):
-        """Mean of the steps between frames around a time; `qvel` is the mean of the two at a frame."""
+        """Mean of the steps between frames around a time, all of them in the air or none; `qvel` is the mean of the two at a
+        frame."""
         count = max(1, int(np.floor(AVERAGED_S * fps + 0.5)))
+        around = lambda n: range(int(np.floor(time * fps - n + 1e-6)), int(np.ceil(time * fps + n - 1e-6)) + 1)
+        while count > 1 and len({self.falls(frame) for frame in around(count)}) > 1:
+            count -= 1
         return np.mean([self.momentary(qvel, fps, time + (2 * i + 1 - count) / fps) for i in range(count)], 0)
 
     def momentary(self, qvel, fps, time):

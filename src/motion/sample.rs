@@ -1,10 +1,15 @@
 //! A motion between its frames and beyond its ends.
 
-use super::Motion;
 use super::velocity::{blend, moved, turned};
+use super::{GRAVITY, Motion};
 use crate::clip::LoopMode;
 use crate::skeleton::Skeleton;
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+
+/// A body whose acceleration is as near to gravity as this falls freely, m/s².
+const FREELY: f64 = 1.0;
+/// Share of a frame by which times may differ and be the same.
+const SAME: f64 = 1e-6;
 
 /// Where a time falls: between two frames of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,14 +88,17 @@ impl Motion {
         }
     }
 
-    /// Mean `qvel` of the frames' steps within `half` seconds on either side of `time`; at least of one step on either
-    /// side, which is [`Motion::sample_qvel`].
+    /// Mean `qvel` of the frames' steps within `half` seconds on either side of `time`, and of fewer near a takeoff or a
+    /// landing, where the velocity changes at once; at least of one step on either side, which is [`Motion::sample_qvel`].
     ///
     /// # Panics
     /// If the motion has no frames.
     pub fn mean_qvel(&self, time: f64, half: f64) -> Vec<f64> {
+        let most = (half * self.fps).round().max(1.0) as usize;
+        let fewer = (2..=most).rev();
+        let count = fewer.into_iter().find(|n| self.all_alike(time, *n));
         // A frame's velocity is the mean of the steps to it and from it: every other frame has every step once.
-        let count = (half * self.fps).round().max(1.0) as usize;
+        let count = count.unwrap_or(1);
         let at = |i: usize| {
             let time = time + (2.0 * i as f64 + 1.0 - count as f64) / self.fps;
             match self.loop_mode {
@@ -103,6 +111,36 @@ impl Motion {
         rest.fold(first, |mean, (i, next)| {
             blend(&mean, &next, 1.0 / (i + 1) as f64)
         })
+    }
+
+    /// Whether the motion falls freely in all of the `count` frames on either side of `time`, or in none.
+    fn all_alike(&self, time: f64, count: usize) -> bool {
+        let (at, count) = (time * self.fps, count as f64);
+        let [first, last] = [(at - count + SAME).floor(), (at + count - SAME).ceil()];
+        let falls = |i: i64| self.falls(i);
+        let (first, last) = (first as i64, last as i64);
+        let alike = falls(first);
+        (first + 1..=last).all(|i| falls(i) == alike)
+    }
+
+    /// Whether the centre of mass falls freely in a frame, from the one before to the one after.
+    fn falls(&self, frame: i64) -> bool {
+        let com = [-1, 0, 1].map(|by| self.com(frame + by));
+        let [Some(before), Some(now), Some(after)] = com else {
+            return false;
+        };
+        let acceleration = (before - now * 2.0 + after) * self.fps.powi(2);
+        (acceleration + Vector3::z() * GRAVITY).norm() < FREELY
+    }
+
+    /// The centre of mass in a frame, of any cycle of a motion that repeats.
+    fn com(&self, frame: i64) -> Option<Vector3<f64>> {
+        let period = self.tracks.com.len().checked_sub(1)? as i64;
+        if self.loop_mode == LoopMode::Clamp || period == 0 {
+            return self.tracks.com.get(usize::try_from(frame).ok()?).copied();
+        }
+        let com = self.tracks.com[frame.rem_euclid(period) as usize];
+        Some((self.cycle_offset(frame.div_euclid(period)) * Point3::from(com)).coords)
     }
 
     /// World poses of all bodies at `time`, each interpolated on its own.

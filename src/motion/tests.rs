@@ -125,6 +125,34 @@ fn a_mean_velocity_is_the_way_over_its_time() {
     assert!((ends[0] - near(0, 1)).abs() < 1e-9 && (ends[1] - near(29, 30)).abs() < 1e-9);
 }
 
+/// It stands, jumps and stands again: means are of the flight or of the ground, and where the two meet of the steps next to it.
+#[test]
+fn mean_velocities_know_takeoff_and_landing() {
+    let s = humanoid();
+    let (fps, takes_off, flies) = (120.0, 20, 48);
+    let lands = takes_off + flies;
+    let up = GRAVITY * flies as f64 / fps / 2.0;
+    let since = |f: usize| (f.clamp(takes_off, lands) - takes_off) as f64 / fps;
+    let height = |f: usize| since(f) * (up - GRAVITY * since(f) / 2.0);
+    let mut qpos = vec![s.rest_qpos(); lands + takes_off + 1];
+    for (f, q) in qpos.iter_mut().enumerate() {
+        q[2] += height(f);
+    }
+    let motion = Motion::from_poses(&s, draft(&s, qpos, fps));
+    for f in 1..motion.qpos.len() - 1 {
+        let expected = match f {
+            f if f < takes_off || f > lands => 0.0,
+            f if f == takes_off || f == lands => (height(f + 1) - height(f - 1)) * fps / 2.0,
+            f => up - GRAVITY * since(f),
+        };
+        let v = motion.mean_qvel(f as f64 / fps, 1.0 / 30.0)[2];
+        assert!(
+            (v - expected).abs() < 1e-9,
+            "frame {f}: {v}, not {expected}"
+        );
+    }
+}
+
 #[test]
 fn one_sided_ends_are_of_second_order() {
     let s = humanoid();
