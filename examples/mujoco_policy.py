@@ -144,7 +144,8 @@ class Reference:
     def falling(self, model, data, qpos, fps):
         """Frames, by number in any cycle, in which the centre of mass falls freely from the one before to the one after."""
         com = []
-        for data.qpos[:] in qpos:
+        for row in qpos:
+            data.qpos[:] = row
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             com.append(data.subtree_com[0].copy())

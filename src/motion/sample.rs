@@ -95,8 +95,7 @@ impl Motion {
     /// If the motion has no frames.
     pub fn mean_qvel(&self, time: f64, half: f64) -> Vec<f64> {
         let most = (half * self.fps).round().max(1.0) as usize;
-        let fewer = (2..=most).rev();
-        let count = fewer.into_iter().find(|n| self.all_alike(time, *n));
+        let count = (2..=most).rev().find(|n| self.all_alike(time, *n));
         // A frame's velocity is the mean of the steps to it and from it: every other frame has every step once.
         let count = count.unwrap_or(1);
         let at = |i: usize| {
@@ -116,11 +115,10 @@ impl Motion {
     /// Whether the motion falls freely in all of the `count` frames on either side of `time`, or in none.
     fn all_alike(&self, time: f64, count: usize) -> bool {
         let (at, count) = (time * self.fps, count as f64);
-        let [first, last] = [(at - count + SAME).floor(), (at + count - SAME).ceil()];
-        let falls = |i: i64| self.falls(i);
-        let (first, last) = (first as i64, last as i64);
-        let alike = falls(first);
-        (first + 1..=last).all(|i| falls(i) == alike)
+        let (first, last) = ((at - count + SAME).floor(), (at + count - SAME).ceil());
+        let mut frames = (first as i64..=last as i64).map(|frame| self.falls(frame));
+        let alike = frames.next();
+        frames.all(|falls| Some(falls) == alike)
     }
 
     /// Whether the centre of mass falls freely in a frame, from the one before to the one after.

@@ -97,6 +97,17 @@ fn a_backflip_of_few_frames_falls_freely() {
     }
 }
 
+/// Without and with [`Options::to_perform`].
+fn as_it_is_and_to_perform(clip: &Clip) -> [Retargeted; 2] {
+    [false, true].map(|to_perform| {
+        let options = Options {
+            to_perform,
+            ..Options::default()
+        };
+        retarget(clip, &humanoid(), &options).unwrap_or_else(|e| panic!("{e}"))
+    })
+}
+
 /// To spin freely this flight would have to be turned by 51 degrees: it stays as it is, or is turned by 17 for a body that is to
 /// perform it. The mean of its momentum's distance from its own mean tells how freely it spins.
 #[test]
@@ -104,13 +115,7 @@ fn a_backflip_is_turned_for_a_body_that_performs_it() {
     let Some(clip) = clip("deepmimic/humanoid3d_backflip.txt", None) else {
         return;
     };
-    let [kept, turned] = [false, true].map(|to_perform| {
-        let options = Options {
-            to_perform,
-            ..Options::default()
-        };
-        retarget(&clip, &humanoid(), &options).unwrap_or_else(|e| panic!("{e}"))
-    });
+    let [kept, turned] = as_it_is_and_to_perform(&clip);
     let changes = |done: &Retargeted| {
         let at = |seconds: f64| (seconds * done.motion.fps).round() as usize;
         let flight = &done.motion.tracks.angular_momentum[at(0.75)..at(1.1)];
@@ -164,12 +169,8 @@ fn a_jump_has_its_spin_with_the_last_push_of_a_body_that_performs_it() {
     let Some(clip) = clip("deepmimic/humanoid3d_jump.txt", None) else {
         return;
     };
-    let [kept, early] = [false, true].map(|to_perform| {
-        let options = Options {
-            to_perform,
-            ..Options::default()
-        };
-        let motion = retarget(&clip, &humanoid(), &options).unwrap().motion;
+    let [kept, early] = as_it_is_and_to_perform(&clip).map(|done| {
+        let motion = done.motion;
         let at = |share: f64| (share * motion.qpos.len() as f64).round() as usize;
         let momenta = &motion.tracks.angular_momentum;
         (momenta[at(0.44)] - momenta[at(0.56)]).norm()
