@@ -351,11 +351,12 @@ impl Imitate {
     }
 
     /// Where a cycle begins, the reference is moved to the agent; so it is while one motion goes over into another, for
-    /// nobody can say beforehand how fast a character gathers speed.
+    /// nobody can say beforehand how fast a character gathers speed, and once it was shoved.
     fn follow(&mut self) {
         let dt = self.setting.physics.control_dt();
         let begins = self.setting.cycles_follow && self.course.begins_cycle(dt);
-        if begins || self.course.eases() {
+        let shoved = self.disturbance.as_ref().is_some_and(Disturbance::leads);
+        if begins || shoved || self.course.eases() {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
             self.course.shift(apart);

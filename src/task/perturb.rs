@@ -20,6 +20,9 @@ pub struct Perturbations {
     pub mass: [f32; 2],
     /// Friction times this.
     pub friction: [f32; 2],
+    /// Whether the reference, from the first shove on, follows the agent along the ground: nothing asks who was shoved out
+    /// of its way to come back to it.
+    pub follow: bool,
 }
 
 impl Default for Perturbations {
@@ -29,6 +32,7 @@ impl Default for Perturbations {
             push_interval_s: [2.0, 4.0],
             mass: [1.0, 1.0],
             friction: [1.0, 1.0],
+            follow: true,
         }
     }
 }
@@ -73,6 +77,7 @@ pub(super) struct Disturbance {
     rng: ChaCha8Rng,
     /// Seconds from the start.
     next_push: f64,
+    was_pushed: bool,
     pub mass: f32,
     pub friction: f32,
 }
@@ -89,6 +94,7 @@ impl Disturbance {
             ranges,
             rng,
             next_push,
+            was_pushed: false,
             mass,
             friction,
         }
@@ -99,10 +105,16 @@ impl Disturbance {
         if self.ranges.push_m_s[1] <= 0.0 || elapsed < self.next_push {
             return None;
         }
+        self.was_pushed = true;
         self.next_push += f64::from(within(self.ranges.push_interval_s, &mut self.rng));
         let size = within(self.ranges.push_m_s, &mut self.rng);
         let way = within([0.0, TAU], &mut self.rng);
         Some(Vector3::new(way.cos(), way.sin(), 0.0) * size)
+    }
+
+    /// Whether the reference is to follow the agent.
+    pub fn leads(&self) -> bool {
+        self.ranges.follow && self.was_pushed
     }
 }
 

@@ -1,5 +1,6 @@
 //! Terms, observations and terminations against what they are by definition.
 
+mod perturb;
 mod reward;
 mod transitions;
 
@@ -397,36 +398,4 @@ fn an_episode_can_start_at_rest_where_the_motion_starts() {
         .rotation
         .angle_to(&env.states()[0].pose.rotation);
     assert!(straight < 1e-5, "the rest pose has straight arms");
-}
-
-/// The same seed disturbs alike, another otherwise, and none at all not.
-#[test]
-fn disturbances_are_those_of_their_seed() {
-    let (stage, motion) = (Arc::new(stage()), motion("walk.glb", Some(LoopMode::Wrap)));
-    let reference = Arc::new(Reference::new(&motion, &stage).expect("a reference"));
-    let play = |perturbations: Perturbations, seed: Option<u64>| {
-        let setting = Setting {
-            perturbations,
-            ..Setting::default()
-        };
-        let mut env = Imitate::new(stage.clone(), reference.clone(), &setting);
-        env.reset(0.2);
-        if let Some(seed) = seed {
-            env.perturb(seed);
-        }
-        let action = vec![0.0; env.action_size()];
-        for _ in 0..6 {
-            env.step(&action);
-        }
-        env.states().to_vec()
-    };
-    let shoves = Perturbations {
-        push_interval_s: [0.05, 0.1],
-        ..Perturbations::usual()
-    };
-    assert_eq!(play(shoves, Some(1)), play(shoves, Some(1)));
-    assert_ne!(play(shoves, Some(1)), play(shoves, Some(2)));
-    assert_ne!(play(shoves, Some(1)), play(shoves, None));
-    let none = Perturbations::default();
-    assert_eq!(play(none, Some(1)), play(none, None));
 }
