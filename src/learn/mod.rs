@@ -14,6 +14,7 @@ mod kernels;
 mod network;
 mod normalizer;
 mod performer;
+mod plan;
 mod policy;
 mod ppo;
 mod presets;
@@ -38,6 +39,7 @@ pub use kernels::Scalar;
 pub use network::{Activation, Mlp, Workspace};
 pub use normalizer::{FrozenNormalizer, Normalizer};
 pub use performer::{Memory, Performer};
+pub use plan::{Plan, TrainError};
 pub use policy::{ActWorkspace, Acted, NamedTensor, Policy, PolicySpec, fill_normal};
 pub use ppo::{Learner, LearnerState};
 pub use presets::{PRESETS, Preset, preset};
@@ -45,7 +47,7 @@ pub use random::RngState;
 pub use run::{Run, RunError};
 pub use stats::UpdateStats;
 pub use surrogate::LossTerms;
-pub use trainer::{Metrics, Plan, TrainError, Trainer, TrainerState};
+pub use trainer::{Metrics, Trainer, TrainerState};
 pub use value_scale::ValueScale;
 
 /// Normalised observations are clipped to ± this.
