@@ -175,7 +175,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// As wide as the curves are; where all are beyond zero on one side, not down to it unless it is near.
+    /// As wide as the curves are; where all are beyond zero on one side, not down to it unless it is near or they are flat.
     fn of(panel: &Panel) -> Self {
         let curves = || {
             panel
@@ -193,11 +193,13 @@ impl Axis {
             values().fold(f64::NEG_INFINITY, f64::max),
         );
         let (mut low, mut high) = if low <= high { (low, high) } else { (0.0, 1.0) };
-        let span = high - low;
-        if span < 1e-9 * high.abs().max(1e-3) {
-            let half = 0.5 * high.abs().max(1e-3);
-            (low, high) = (low - half, high + half);
+        if high - low < 1e-9 * high.abs().max(1e-3) {
+            (low, high) = match panel.scale {
+                Scale::Linear if high != 0.0 => (low.min(0.0), high.max(0.0)),
+                _ => (low - 0.5, high + 0.5),
+            };
         }
+        let span = high - low;
         let near = |end: f64| panel.scale == Scale::Linear && end.abs() <= span;
         low = if low >= 0.0 && near(low) {
             0.0
@@ -310,7 +312,11 @@ mod tests {
         let far = axis(Scale::Linear, &[100.0, 101.0]);
         assert!((far.share(100.5) - 0.5).abs() < 1e-9 && far.share(101.0) < 1.0);
         let flat = axis(Scale::Linear, &[2.0, 2.0]);
-        assert_eq!(flat.share(2.0), 0.5);
+        assert_eq!((flat.low, flat.high), (0.0, 2.1));
+        let nothing = axis(Scale::Linear, &[0.0, 0.0]);
+        assert_eq!(nothing.share(0.0), 0.5);
+        let flat = axis(Scale::Logarithmic, &[1e-2, 1e-2]);
+        assert!((flat.share(1e-2) - 0.5).abs() < 1e-12);
         let log = axis(Scale::Logarithmic, &[1e-4, 1e-2]);
         assert!((log.share(1e-3) - 0.5).abs() < 1e-12);
         let labels: Vec<String> = log.ticks().into_iter().map(|(_, label)| label).collect();
