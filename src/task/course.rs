@@ -118,9 +118,9 @@ impl Course {
         self.reference.begins_cycle([before, self.time()])
     }
 
-    /// Whether one motion is still going over into another.
-    pub fn eases(&self) -> bool {
-        self.transition.eases(self.passed)
+    /// Whether another motion led into the present one.
+    pub fn has_changed(&self) -> bool {
+        self.transition.has_led()
     }
 
     /// Moves the motion on along the ground.

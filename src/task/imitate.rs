@@ -107,8 +107,8 @@ impl Imitate {
 
     /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one,
     /// from where and whither the present one has brought the character, within 0.4 s from its pose to the new one's,
-    /// and within a second from its speed. In that second the new one follows the agent along the ground, and reaches its
-    /// own pace: it begins at half to one and a half of it, so as to be as fast as the present one.
+    /// and within a second from its speed and to its own pace: it begins at half to one and a half of it, so as to be as
+    /// fast as the present one. The new one follows the agent along the ground.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         self.course.change_to(reference);
         self.look_ahead();
@@ -350,13 +350,13 @@ impl Imitate {
         }
     }
 
-    /// Where a cycle begins, the reference is moved to the agent; so it is while one motion goes over into another, for
-    /// nobody can say beforehand how fast a character gathers speed, and once it was shoved.
+    /// Where a cycle begins, the reference is moved to the agent; so it always is once one motion went over into another,
+    /// for nobody can say beforehand how fast a character gathers speed, or it was shoved.
     fn follow(&mut self) {
         let dt = self.setting.physics.control_dt();
         let begins = self.setting.cycles_follow && self.course.begins_cycle(dt);
         let shoved = self.disturbance.as_ref().is_some_and(Disturbance::leads);
-        if begins || shoved || self.course.eases() {
+        if begins || shoved || self.course.has_changed() {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
             self.course.shift(apart);

@@ -102,9 +102,9 @@ impl Transition {
         blend.is_some()
     }
 
-    /// Whether the speed of the motion before is still felt when so many seconds have `passed`.
-    pub fn eases(&self, passed: f64) -> bool {
-        self.blend.is_some() && passed < EASES
+    /// Whether another motion led into this one.
+    pub fn has_led(&self) -> bool {
+        self.blend.is_some()
     }
 
     /// The same motion, moved on along the ground.

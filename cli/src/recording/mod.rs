@@ -70,6 +70,8 @@ pub struct Recording {
     pub rewards: Vec<Curve>,
     /// Metres by which the reference stands to the right of the agent.
     pub beside: f64,
+    /// When the agent fails, seconds from the first frame.
+    pub failed_s: Option<f64>,
 }
 
 impl Recording {
@@ -85,6 +87,7 @@ impl Recording {
             phase: motion.tracks.phase.clone(),
             rewards: Vec::new(),
             beside: 0.0,
+            failed_s: None,
         }
     }
 

@@ -35,6 +35,9 @@ impl Recording {
                 .collect(),
             rewards: rewards(frames),
             beside: 0.0,
+            failed_s: trace
+                .failure
+                .map(|_| trace.survived as f64 / trace.control_hz),
         }
     }
 }

@@ -63,6 +63,7 @@ fn waving() -> Recording {
             })
             .collect(),
         beside: 0.0,
+        failed_s: None,
     }
 }
 

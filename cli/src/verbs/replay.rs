@@ -123,6 +123,7 @@ impl Args {
             "frames": shown.phase.len(),
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
+            "failed_s": shown.failed_s,
         });
         printer.result(&json, || summary(&shown, saved.as_deref()))
     }
@@ -191,7 +192,13 @@ fn summary(shown: &Recording, saved: Option<&Path>) -> String {
         "reference"
     };
     let place = saved.map_or_else(|| shown.name.clone(), |path| path.display().to_string());
-    format!("{place}: {who}, {frames} frames at {:.1} Hz", shown.fps)
+    let failed = shown.failed_s.map_or_else(String::new, |seconds| {
+        format!("; the agent fails after {seconds:.1} s")
+    });
+    format!(
+        "{place}: {who}, {frames} frames at {:.1} Hz{failed}",
+        shown.fps
+    )
 }
 
 impl Sinks {

@@ -161,6 +161,10 @@ fn motions_of_a_run_are_shown_one_after_the_other() {
     ];
     let shown = bench.json(&[&line[..], &["first,sec,first"]].concat());
     assert_eq!(shown["agent"], true);
+    assert!(
+        shown["failed_s"].is_null(),
+        "a fifth of a second is too short for a fall"
+    );
     // Of the second all 31 frames but what comes before its nearest moment, in its first half.
     let frames = shown["frames"].as_u64().expect("a number");
     assert!((6 + 15 + 6..=6 + 31 + 6).contains(&frames), "{frames}");
@@ -175,6 +179,30 @@ fn motions_of_a_run_are_shown_one_after_the_other() {
             "{said}"
         );
     }
+}
+
+/// A walk that was hardly practised ends on its nose within a second or two.
+#[test]
+fn it_is_said_when_the_agent_fails() {
+    let bench = Workbench::with_clip();
+    let walk = concat!(env!("CARGO_MANIFEST_DIR"), "/../clips/walk.glb");
+    bench.write(
+        "small.json",
+        br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 64, "hidden": [8] }"#,
+    );
+    let train = ["train", walk, "--preset", "small.json", "--out", "walking"];
+    bench.mimic(&train).assert().success();
+    let line = ["replay", "walking", "--save", "a.rrd", "--seconds", "9"];
+    let shown = bench.json(&line);
+    let failed = shown["failed_s"].as_f64().expect("it fails");
+    let frames = shown["frames"].as_f64().expect("a number");
+    assert!(
+        failed < 5.0 && (failed * 30.0 + 1.0 - frames).abs() < 1e-6,
+        "{shown}"
+    );
+    let said = bench.mimic(&line).assert().success();
+    let said = String::from_utf8_lossy(&said.get_output().stdout).into_owned();
+    assert!(said.contains("the agent fails after"), "{said}");
 }
 
 /// A viewer that does nothing but end like this.

@@ -115,6 +115,13 @@ fn another_motion_begins_where_the_one_before_has_led() {
         (speed(&after).norm() - speed(&alone).norm()).abs() < 1e-4,
         "{turn}"
     );
+    // It is where the agent is, and stays there.
+    for _ in 0..12 {
+        env.step(&action);
+        env.wanted(&mut after);
+        let at = env.states()[0].pose.translation.vector.xy();
+        assert!((root(&after).0 - at).norm() < 1e-4);
+    }
 }
 
 /// A walk at half its speed goes over into itself as it is: that begins at half its pace, so nothing slides, gathers speed within
