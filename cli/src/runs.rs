@@ -6,9 +6,10 @@ use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::clip::LoopMode;
-use mimic::evaluate::{self, Evaluation, Options, Start, Trace};
+use mimic::evaluate::{self, Evaluation, Opening, Options, Trace};
 use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
 use mimic::motion::MotionError;
+use mimic::task::Perturbations;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -85,8 +86,17 @@ pub fn keep(run: &Run, results: &[Measured]) -> Outcome {
         .map_err(failure)
 }
 
+/// Those of the run's training, or else the usual ones.
+pub fn perturbations(run: &Run) -> Perturbations {
+    let trained = run.plan().task.perturbations;
+    match trained.is_on() {
+        true => trained,
+        false => Perturbations::usual(),
+    }
+}
+
 /// The agent's performance of reference number `which`.
-pub fn record(run: &Run, which: usize, start: Start, seconds: f64) -> Outcome<Recording> {
+pub fn record(run: &Run, which: usize, opening: Opening, seconds: f64) -> Outcome<Recording> {
     let performer: Performer = run.performer().map_err(failure)?;
     let motion = run.motions().get(which).ok_or_else(|| {
         let count = run.motions().len();
@@ -96,7 +106,7 @@ pub fn record(run: &Run, which: usize, start: Start, seconds: f64) -> Outcome<Re
             which + 1
         ))
     })?;
-    let traces = evaluate::play(&performer, which, &[(start, None)], seconds);
+    let traces = evaluate::play(&performer, which, &[opening], seconds);
     let traces = traces.map_err(learn_failure)?;
     shown(run, &motion.name, which, &performer, &traces[0])
 }

@@ -7,7 +7,6 @@ use crate::printer::Printer;
 use crate::runs::{self, Measured};
 use mimic::evaluate::{Evaluation, Options};
 use mimic::learn::Run;
-use mimic::task::Perturbations;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -60,7 +59,7 @@ impl Args {
         let options = Options {
             episodes: self.episodes,
             seconds: self.seconds,
-            perturbations: self.perturb.then(|| perturbations(&run)),
+            perturbations: self.perturb.then(|| runs::perturbations(&run)),
         };
         let out = self
             .out
@@ -77,14 +76,6 @@ impl Args {
         };
         printer.result(&runs::evaluation_json(&results), || text(&results))?;
         kept
-    }
-}
-
-fn perturbations(run: &Run) -> Perturbations {
-    let trained = run.plan().task.perturbations;
-    match trained.is_on() {
-        true => trained,
-        false => Perturbations::usual(),
     }
 }
 

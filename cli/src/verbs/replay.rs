@@ -9,7 +9,7 @@ use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
 use crate::runs;
 use crate::viewer::{self, Viewer};
-use mimic::evaluate::Start;
+use mimic::evaluate::{Options, Start};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -18,6 +18,7 @@ Examples:
   mimic replay --rerun                      the newest run, in the viewer
   mimic replay kick --rerun --beside        the run or clip `kick`, agent and reference side by side
   mimic replay kick --rerun --phase 0.44    from where `mimic eval` says that it fails
+  mimic replay walk --rerun --perturb       how it takes shoves
   mimic replay walk.fbx --save walk.rrd     imports and retargets first; open it with `rerun walk.rrd`
   mimic replay walk-and-run --rerun --sequence walk,run,walk   one policy, from one motion into the next
   mimic replay kick --connect 127.0.0.1:9876";
@@ -69,6 +70,9 @@ pub struct Args {
         conflicts_with = "sequence"
     )]
     phase: Option<f64>,
+    /// Disturb the agent: shoves, weight and friction as in the phase of `mimic eval --perturb` that is nearest to `--phase`
+    #[arg(long, conflicts_with = "sequence")]
+    perturb: bool,
     /// Which motion to show, by number from 1, of a run that learned several [default: 1]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     motion: Option<usize>,
@@ -151,8 +155,12 @@ impl Args {
             return runs::record_sequence(&run, &self.sequence, seconds, printer);
         }
         let which = self.motion.unwrap_or(1) - 1;
-        let start = Start::At(self.phase.unwrap_or(0.0));
-        runs::record(&run, which, start, self.seconds.unwrap_or(SECONDS))
+        let phase = self.phase.unwrap_or(0.0);
+        // `mimic eval` disturbs each of its phases by its number.
+        let number = (phase * Options::default().episodes as f64).round() as u64;
+        let disturbed = self.perturb.then(|| (runs::perturbations(&run), number));
+        let opening = (Start::At(phase), disturbed);
+        runs::record(&run, which, opening, self.seconds.unwrap_or(SECONDS))
     }
 
     fn record_motion(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
@@ -171,6 +179,7 @@ impl Args {
             ("--beside", self.beside),
             ("--seconds", self.seconds.is_some()),
             ("--phase", self.phase.is_some()),
+            ("--perturb", self.perturb),
             ("--motion", self.motion.is_some()),
             ("--sequence", !self.sequence.is_empty()),
         ];

@@ -74,6 +74,7 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
         &["--seconds", "3"],
         &["--motion", "2"],
         &["--phase", "0.5"],
+        &["--perturb"],
         &["--sequence", "sway"],
     ] {
         let line = [&["replay", "sway.txt", "--save", "a.rrd"], flags].concat();
@@ -190,8 +191,17 @@ fn it_is_said_when_the_agent_fails() {
         "small.json",
         br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 64, "hidden": [8] }"#,
     );
+    let shoves = [
+        "--set",
+        "task.perturbations.push_m_s=[3,3]",
+        "--set",
+        "task.perturbations.push_interval_s=[0.1,0.1]",
+    ];
     let train = ["train", walk, "--preset", "small.json", "--out", "walking"];
-    bench.mimic(&train).assert().success();
+    bench
+        .mimic(&[&train[..], &shoves].concat())
+        .assert()
+        .success();
     let line = ["replay", "walking", "--save", "a.rrd", "--seconds", "9"];
     let shown = bench.json(&line);
     let failed = shown["failed_s"].as_f64().expect("it fails");
@@ -203,6 +213,9 @@ fn it_is_said_when_the_agent_fails() {
     let said = bench.mimic(&line).assert().success();
     let said = String::from_utf8_lossy(&said.get_output().stdout).into_owned();
     assert!(said.contains("the agent fails after"), "{said}");
+    let shoved = bench.json(&[&line[..], &["--perturb"]].concat());
+    let sooner = shoved["failed_s"].as_f64().expect("it fails");
+    assert!(sooner < failed, "{shoved}, {failed} s without shoves");
 }
 
 /// A viewer that does nothing but end like this.

@@ -66,7 +66,7 @@ pub fn make_up(run: &Run, trainer: &Trainer, printer: &Printer) -> Outcome {
 
 /// The recording's file; `None` where the agent has nothing to show.
 fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
-    match runs::record(run, 0, Start::At(0.0), REPLAY_S) {
+    match runs::record(run, 0, (Start::At(0.0), None), REPLAY_S) {
         Ok(shown) => {
             let file = recording(run);
             replay::save(&shown, &file, run.dir())?;
