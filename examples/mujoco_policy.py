@@ -213,8 +213,9 @@ class Agent:
         header, self.tensors = load(run / "policy.safetensors")
         details, self.layers = header["details"], len(header["policy"]["hidden"]) + 1
         self.task, slots = details["task"], json.loads(details["slots"])["slots"]
-        if self.task.get("observations", "tracking") != "tracking" or self.task["actions"]["kind"] != "residual":
-            sys.exit(f"{run}: this example knows the observations and actions of the default preset alone; train with it")
+        observations, follows = self.task.get("observations", "tracking"), self.task.get("cycles_follow", False)
+        if observations != "tracking" or self.task["actions"]["kind"] != "residual" or follows:
+            sys.exit(f"{run}: this example knows observations, actions and cycles of the default preset alone; train with it")
         self.activation = {"relu": lambda x: np.maximum(x, 0.0), "tanh": np.tanh, "elu": lambda x: np.where(x < 0, np.expm1(x), x)}[
             header["policy"]["activation"]
         ]

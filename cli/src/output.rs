@@ -1,6 +1,7 @@
 //! Where results are written.
 
 use crate::failure::{Failure, Outcome};
+use crate::locate;
 use std::path::{Path, PathBuf};
 
 /// Writes a file as a whole or not at all.
@@ -18,13 +19,27 @@ pub fn result_path(out: Option<&Path>, name: &str, extension: &str) -> PathBuf {
     }
 }
 
-/// Creates the folder of a result, and refuses to replace the input it comes from.
-pub fn make_room(path: &Path, input: &Path) -> Outcome {
+/// Creates the folder of a result, and refuses to replace the input it comes from, or what is no file with its `extension`.
+pub fn make_room(path: &Path, input: &Path, extension: &str) -> Outcome {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
     }
     // Only now: the way to the input may lead through the folder that wasn't there.
-    spare_input(path, input)
+    spare_input(path, input)?;
+    spare_others(path, extension)
+}
+
+/// Refuses to replace a file of another kind than the result's, a clip by its recording for one, and what is no file at all.
+pub fn spare_others(path: &Path, extension: &str) -> Outcome {
+    let replaceable = path.is_file() && locate::has_extension(path, extension);
+    // A folder isn't replaced: writing over it fails.
+    if replaceable || path.is_dir() || !path.exists() {
+        return Ok(());
+    }
+    Err(Failure::user(format!(
+        "`{}` is there already and is no `.{extension}` file, name another file to write",
+        path.display()
+    )))
 }
 
 /// Refuses to replace the input of a result.

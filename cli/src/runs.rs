@@ -86,13 +86,14 @@ pub fn keep(run: &Run, results: &[Measured]) -> Outcome {
         .map_err(failure)
 }
 
-/// Those of the run's training, or else the usual ones.
-pub fn perturbations(run: &Run) -> Perturbations {
+/// What disturbs a run's agent when it is measured: what disturbed its training, or else, if it is `asked` for, what usually
+/// does. The reference follows, however the agent was trained, so that all are measured alike.
+pub fn perturbations(run: &Run, asked: bool) -> Option<Perturbations> {
     let trained = run.plan().task.perturbations;
-    match trained.is_on() {
-        true => trained,
-        false => Perturbations::usual(),
-    }
+    (asked || trained.is_on()).then(|| Perturbations {
+        follow: true,
+        ..trained.or_usual()
+    })
 }
 
 /// The agent's performance of reference number `which`.
@@ -136,16 +137,20 @@ pub fn record_sequence(
 ) -> Outcome<Recording> {
     let which: Vec<usize> = names
         .iter()
-        .map(|name| number_of(run, name))
+        .map(|name| number_of(run, name.trim()))
         .collect::<Outcome<_>>()?;
     let performer: Performer = run.performer().map_err(failure)?;
     let (trace, begun) =
         evaluate::play_sequence(&performer, &which, seconds).map_err(learn_failure)?;
     if trace.failure.is_some() {
+        let advice = match (begun, run.plan().task.transitions_s) {
+            (2.., None) => {
+                "; going over has to be learned: `mimic train … --set 'task.transitions_s=[2,4]'`"
+            }
+            _ => "",
+        };
         printer.warn(format!(
-            "the agent fails after {:.1} s, in `{}`, number {begun} of the sequence; going over has to be learned: \
-             `--set 'task.transitions_s=[2,4]'`",
-            trace.survived as f64 / trace.control_hz,
+            "the agent fails in `{}`, number {begun} of the sequence{advice}",
             names[begun - 1]
         ));
     }

@@ -66,7 +66,7 @@ struct Playing {
 /// Plays reference number `which` once for each of `openings`, for `seconds` or to its end.
 ///
 /// An episode fails by a fall, or when the bodies are 0.5 m from their reference in the mean, whatever rules the policy
-/// was trained under. Up to [`LANES`](crate::sim::LANES) episodes take little longer than one.
+/// was trained under; where the reference follows the agent along the ground, from there. Up to [`LANES`](crate::sim::LANES) episodes take little longer than one.
 ///
 /// # Errors
 /// A task of another shape than the policy's.

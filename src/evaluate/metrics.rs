@@ -47,7 +47,8 @@ pub struct Evaluation {
     /// One more episode, from standing still in the rest pose.
     #[serde(default)]
     pub from_rest: Option<Digest>,
-    /// The same phases again, disturbed.
+    /// The same phases again, disturbed. Where the reference follows who was shoved, errors are measured from there, and
+    /// nobody fails by being out of its way.
     #[serde(default)]
     pub perturbed: Option<Digest>,
 }
@@ -75,7 +76,7 @@ impl Failed {
 }
 
 /// The fields of an [`Evaluation`] that count where an agent has more to do than to track.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Digest {
     pub episodes: usize,
     pub survival: f64,
@@ -83,10 +84,13 @@ pub struct Digest {
     pub mpjpe_global_mm: f64,
     pub mpjpe_local_mm: f64,
     pub normalized_return: f64,
+    /// The episodes that failed.
+    #[serde(default)]
+    pub failures: Vec<Failed>,
 }
 
-impl From<&Evaluation> for Digest {
-    fn from(all: &Evaluation) -> Self {
+impl From<Evaluation> for Digest {
+    fn from(all: Evaluation) -> Self {
         Self {
             episodes: all.episodes,
             survival: all.survival,
@@ -94,6 +98,7 @@ impl From<&Evaluation> for Digest {
             mpjpe_global_mm: all.mpjpe_global_mm,
             mpjpe_local_mm: all.mpjpe_local_mm,
             normalized_return: all.normalized_return,
+            failures: all.failures,
         }
     }
 }

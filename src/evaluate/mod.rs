@@ -60,7 +60,7 @@ pub fn evaluate(
     let traces = traces?.concat();
     let (undisturbed, disturbed) = traces.split_at(count + 1);
     let stage = performer.stage();
-    let digest = |traces: &[Trace]| Digest::from(&measure(stage, traces));
+    let digest = |traces: &[Trace]| Digest::from(measure(stage, traces));
     Ok(Evaluation {
         from_rest: Some(digest(&undisturbed[count..])),
         perturbed: (!disturbed.is_empty()).then(|| digest(disturbed)),

@@ -125,7 +125,8 @@ impl Run {
         if !path.exists() {
             return Err(RunError::NoRun(dir.to_owned()));
         }
-        let config: Value = serde_json::from_str(&read(&path)?).map_err(|e| corrupt(&path, e))?;
+        let text = read(&path)?;
+        let config: Value = serde_json::from_str(&text).map_err(|e| corrupt(&path, e))?;
         // A newer version may have other fields, so this comes first.
         if (&config["format"], &config["version"]) != (&json!("run"), &json!(1)) {
             let reason = format!(
@@ -134,7 +135,12 @@ impl Run {
             );
             return Err(RunError::Config { path, reason });
         }
-        let config: Config = serde_json::from_value(config).map_err(|e| corrupt(&path, e))?;
+        // From the text, whose lines an error names.
+        let config: Config = serde_json::from_str(&text).map_err(|e| corrupt(&path, e))?;
+        config.plan.check().map_err(|e| RunError::Config {
+            path: path.clone(),
+            reason: e.to_string(),
+        })?;
         let mjcf = read(&dir.join("skeleton.xml"))?;
         let slots = read(&dir.join("skeleton.json"))?;
         let mut motions = Vec::new();

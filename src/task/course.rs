@@ -119,8 +119,8 @@ impl Course {
     }
 
     /// Whether another motion led into the present one.
-    pub fn has_changed(&self) -> bool {
-        self.transition.has_led()
+    pub fn was_led_into(&self) -> bool {
+        self.transition.was_led_into()
     }
 
     /// Moves the motion on along the ground.

@@ -350,13 +350,17 @@ impl Imitate {
         }
     }
 
-    /// Where a cycle begins, the reference is moved to the agent; so it always is once one motion went over into another,
-    /// for nobody can say beforehand how fast a character gathers speed, or it was shoved.
+    /// Moves the reference to the agent along the ground: where a cycle begins, if cycles follow; from the first shove on, if
+    /// the disturbance says so; and always once another motion has led into this one, for nobody can say beforehand how fast
+    /// a character gathers speed.
     fn follow(&mut self) {
         let dt = self.setting.physics.control_dt();
         let begins = self.setting.cycles_follow && self.course.begins_cycle(dt);
-        let shoved = self.disturbance.as_ref().is_some_and(Disturbance::leads);
-        if begins || shoved || self.course.has_changed() {
+        let shoved = self
+            .disturbance
+            .as_ref()
+            .is_some_and(Disturbance::is_followed);
+        if begins || shoved || self.course.was_led_into() {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
             self.course.shift(apart);

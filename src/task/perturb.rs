@@ -7,7 +7,8 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 
-/// Ranges, least and most, that every episode draws from. By default nothing is disturbed.
+/// What disturbs episodes: ranges, least and most, that every one draws from, and whether its reference then follows. By
+/// default nothing is disturbed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Perturbations {
@@ -48,6 +49,17 @@ impl Perturbations {
         }
     }
 
+    /// These, if they disturb anything, else the usual ones.
+    pub fn or_usual(self) -> Self {
+        match self.is_on() {
+            true => self,
+            false => Self {
+                follow: self.follow,
+                ..Self::usual()
+            },
+        }
+    }
+
     /// Whether anything is disturbed at all.
     pub fn is_on(&self) -> bool {
         let off = Self::default();
@@ -56,14 +68,21 @@ impl Perturbations {
 
     pub(super) fn check(&self) -> Result<(), TaskError> {
         let ranges = [
-            ("perturbations.push_m_s", self.push_m_s, 0.0),
-            ("perturbations.push_interval_s", self.push_interval_s, 0.05),
-            ("perturbations.mass", self.mass, 0.05),
-            ("perturbations.friction", self.friction, 0.0),
+            ("task.perturbations.push_m_s", self.push_m_s, 0.0),
+            (
+                "task.perturbations.push_interval_s",
+                self.push_interval_s,
+                0.05,
+            ),
+            ("task.perturbations.mass", self.mass, 0.05),
+            ("task.perturbations.friction", self.friction, 0.0),
         ];
         for (name, [low, high], least) in ranges {
-            let value = if low <= high { low } else { high };
-            if !(low >= least && low <= high && high <= 100.0) {
+            if low > high {
+                return Err(TaskError::Order { name, low, high });
+            }
+            let value = if low >= least { high } else { low };
+            if !(low >= least && high <= 100.0) {
                 return Err(TaskError::Range { name, value, least });
             }
         }
@@ -112,8 +131,8 @@ impl Disturbance {
         Some(Vector3::new(way.cos(), way.sin(), 0.0) * size)
     }
 
-    /// Whether the reference is to follow the agent.
-    pub fn leads(&self) -> bool {
+    /// Whether the reference follows the agent by now.
+    pub fn is_followed(&self) -> bool {
         self.ranges.follow && self.was_pushed
     }
 }
@@ -161,7 +180,7 @@ mod tests {
             };
             assert!(
                 all.check()
-                    .is_err_and(|e| e.to_string().contains("perturbations.mass"))
+                    .is_err_and(|e| e.to_string().contains("task.perturbations.mass"))
             );
         }
     }

@@ -161,11 +161,11 @@ pub struct Setting {
     /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
     /// [`Setting::start_anywhere`].
     pub adaptive_starts: f64,
-    /// Seconds after which an episode goes over into another motion of the run, and after which into the next: least and
-    /// most. `None` keeps it to one.
+    /// Seconds after which an episode goes over into another motion of the run, which follows the agent along the ground, and
+    /// after which into the next: least and most. `None` keeps it to one.
     pub transitions_s: Option<[f64; 2]>,
     /// Whether every cycle of a motion that repeats begins where the agent's root is along the ground, so that nothing asks
-    /// it to catch up; else the motion goes its own way.
+    /// it to catch up; else the motion goes its own way, until a shove or another motion that led into it.
     pub cycles_follow: bool,
     /// Longest episode in training, seconds.
     pub episode_s: f64,
@@ -294,6 +294,12 @@ pub enum TaskError {
     NoSuchTerm {
         term: &'static str,
         kernels: Kernels,
+    },
+    #[error("{name} is [{low}, {high}], and must be [least, most]")]
+    Order {
+        name: &'static str,
+        low: f32,
+        high: f32,
     },
     #[error(
         "{name} is a range that has {value} in it, and must be [least, most] from {least} to 100"

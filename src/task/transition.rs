@@ -103,7 +103,7 @@ impl Transition {
     }
 
     /// Whether another motion led into this one.
-    pub fn has_led(&self) -> bool {
+    pub fn was_led_into(&self) -> bool {
         self.blend.is_some()
     }
 

@@ -175,7 +175,8 @@ struct Axis {
 }
 
 impl Axis {
-    /// As wide as the curves are; where all are beyond zero on one side, not down to it unless it is near or they are flat.
+    /// As wide as the curves are; where all are beyond zero on one side, not down to it unless it is near or they are
+    /// flat; flat at zero, or logarithmic, half a unit on either side.
     fn of(panel: &Panel) -> Self {
         let curves = || {
             panel

@@ -107,7 +107,7 @@ impl Args {
             .to_string_lossy()
             .into_owned();
         for input in &inputs {
-            make_room(&output, input)?;
+            make_room(&output, input, "clip")?;
         }
         clip.save(&output).map_err(|e| Failure::write(&output, e))?;
         let report = ClipReport::new(&output, clip);

@@ -2,10 +2,11 @@
 
 use crate::args::at_least_one;
 use crate::failure::{Failure, Outcome};
+use crate::locate;
 use crate::output;
 use crate::printer::Printer;
 use crate::runs::{self, Measured};
-use mimic::evaluate::{Evaluation, Options};
+use mimic::evaluate::{Failed, Options};
 use mimic::learn::Run;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +38,8 @@ pub struct Args {
     #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds)]
     seconds: f64,
     /// Play every phase a second time, disturbed: shoves, weight and friction as in the run's training, or else the
-    /// usual ones (docs/presets.md)
+    /// usual ones (docs/presets.md); from the first shove on the reference follows the agent [default: for runs that were
+    /// trained so]
     #[arg(long)]
     perturb: bool,
     /// Threads [default: all]; the result is the same at any number
@@ -59,7 +61,7 @@ impl Args {
         let options = Options {
             episodes: self.episodes,
             seconds: self.seconds,
-            perturbations: self.perturb.then(|| runs::perturbations(&run)),
+            perturbations: runs::perturbations(&run, self.perturb),
         };
         let out = self
             .out
@@ -86,14 +88,19 @@ fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
-    let inside = folder.is_some() && folder == run.dir().canonicalize().ok();
+    let own = folder.is_some() && folder == run.dir().canonicalize().ok();
+    let (inside, whose) = match own {
+        true => (true, "the"),
+        false => (folder.is_some_and(|folder| locate::is_run(&folder)), "a"),
+    };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if inside && !name.starts_with("eval-") {
         return Err(Failure::input(
             &path,
-            "belongs to the run, name a file elsewhere, or one like `eval-long.json`",
+            format!("belongs to {whose} run, name a file elsewhere, or one like `eval-long.json`"),
         ));
     }
+    output::spare_others(&path, "json")?;
     Ok(path)
 }
 
@@ -106,7 +113,11 @@ fn write(path: &Path, results: &[Measured]) -> Outcome {
 
 /// A run that can't be written, such as somebody else's, can still be measured.
 fn keep(run: &Run, options: &Options, results: &[Measured], printer: &Printer) {
-    if *options != Options::default() {
+    let usual = Options {
+        perturbations: options.perturbations,
+        ..Options::default()
+    };
+    if *options != usual {
         printer.note(format!(
             "`{}` keeps its evaluation with the default options; `--out FILE` writes this one",
             run.dir().display()
@@ -118,14 +129,13 @@ fn keep(run: &Run, options: &Options, results: &[Measured], printer: &Printer) {
 }
 
 /// Start phases from which it fails, the first few of them.
-fn failed(evaluation: &Evaluation) -> Option<(String, String)> {
-    let failures = &evaluation.failures;
+fn failed(failures: &[Failed], how: &str) -> Option<(String, String)> {
     let starts = failures.iter().take(MOST_PHASES);
     let mut phases: Vec<String> = starts.map(|f| format!("{:.2}", f.start)).collect();
     if failures.len() > MOST_PHASES {
         phases.push("…".to_owned());
     }
-    let name = "fails from phase".to_owned();
+    let name = format!("fails from phase{how}");
     (!phases.is_empty()).then(|| (name, phases.join(" ")))
 }
 
@@ -167,10 +177,10 @@ pub fn text(results: &[Measured]) -> String {
                 format!("{:.2} rad", e.root_rotation_turned_rad),
             ),
         ];
-        let digests = [("from rest", e.from_rest), ("disturbed", e.perturbed)];
+        let digests = [("from rest", &e.from_rest), ("disturbed", &e.perturbed)];
         let digests = digests
             .into_iter()
-            .filter_map(|(how, digest)| Some((how, digest?)));
+            .filter_map(|(how, digest)| Some((how, digest.as_ref()?)));
         let rows = rows.map(|(name, value)| (name.to_owned(), value));
         let more = digests.flat_map(|(how, d)| {
             [
@@ -181,7 +191,10 @@ pub fn text(results: &[Measured]) -> String {
                 ),
             ]
         });
-        let rows = rows.into_iter().chain(more).chain(failed(e));
+        let shoved = e.perturbed.iter();
+        let shoved = shoved.filter_map(|d| failed(&d.failures, ", disturbed"));
+        let failed = failed(&e.failures, "").into_iter().chain(shoved);
+        let rows = rows.into_iter().chain(more).chain(failed);
         let rows: String = rows
             .map(|(name, value)| format!("  {name:34} {value:>12}\n"))
             .collect();

@@ -162,7 +162,7 @@ impl Args {
             ..self.import.options()
         };
         let clip = import::load(input, &options).map_err(|e| Failure::input(input, e))?;
-        make_room(output, input)?;
+        make_room(output, input, "clip")?;
         clip.save(output).map_err(|e| Failure::write(output, e))?;
         Ok(ClipReport::new(output, clip))
     }

@@ -64,7 +64,7 @@ impl Args {
         };
         report.map = rows(&map, &joints);
         if let Some(path) = &self.write_map {
-            make_room(path, &file)?;
+            make_room(path, &file, "json")?;
             write_whole(path, map_file(&map, &joints).as_bytes())?;
             tell(path, &map, printer);
         }

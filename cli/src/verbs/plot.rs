@@ -93,7 +93,7 @@ impl Args {
         };
         let path = output::result_path(self.out.as_deref(), file, "svg");
         for log in &logs {
-            output::make_room(&path, &log.folder.join(runs::METRICS))?;
+            output::make_room(&path, &log.folder.join(runs::METRICS), "svg")?;
         }
         let panels = panels(&logs, self.smooth);
         output::write_whole(&path, curves::curves(&names, &panels).as_bytes())?;

@@ -70,7 +70,7 @@ pub struct Args {
         conflicts_with = "sequence"
     )]
     phase: Option<f64>,
-    /// Disturb the agent: shoves, weight and friction as in the phase of `mimic eval --perturb` that is nearest to `--phase`
+    /// Disturb the agent: shoves, weight and friction as in the nearest of the 32 phases of `mimic eval --perturb`
     #[arg(long, conflicts_with = "sequence")]
     perturb: bool,
     /// Which motion to show, by number from 1, of a run that learned several [default: 1]
@@ -127,9 +127,10 @@ impl Args {
             "frames": shown.phase.len(),
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
+            "perturbed": self.perturb,
             "failed_s": shown.failed_s,
         });
-        printer.result(&json, || summary(&shown, saved.as_deref()))
+        printer.result(&json, || summary(&shown, saved.as_deref(), self.perturb))
     }
 }
 
@@ -156,9 +157,11 @@ impl Args {
         }
         let which = self.motion.unwrap_or(1) - 1;
         let phase = self.phase.unwrap_or(0.0);
-        // `mimic eval` disturbs each of its phases by its number.
-        let number = (phase * Options::default().episodes as f64).round() as u64;
-        let disturbed = self.perturb.then(|| (runs::perturbations(&run), number));
+        let perturbations = self
+            .perturb
+            .then(|| runs::perturbations(&run, true))
+            .flatten();
+        let disturbed = perturbations.map(|ranges| (ranges, phase_number(phase)));
         let opening = (Start::At(phase), disturbed);
         runs::record(&run, which, opening, self.seconds.unwrap_or(SECONDS))
     }
@@ -193,7 +196,13 @@ impl Args {
     }
 }
 
-fn summary(shown: &Recording, saved: Option<&Path>) -> String {
+/// The phase of `mimic eval` that is nearest: it disturbs each by its number.
+fn phase_number(phase: f64) -> u64 {
+    let episodes = Options::default().episodes;
+    ((phase * episodes as f64).round() as u64).min(episodes as u64 - 1)
+}
+
+fn summary(shown: &Recording, saved: Option<&Path>, perturbed: bool) -> String {
     let frames = shown.phase.len();
     let who = if shown.agent.is_some() {
         "agent and reference"
@@ -204,8 +213,9 @@ fn summary(shown: &Recording, saved: Option<&Path>) -> String {
     let failed = shown.failed_s.map_or_else(String::new, |seconds| {
         format!("; the agent fails after {seconds:.1} s")
     });
+    let how = if perturbed { ", disturbed" } else { "" };
     format!(
-        "{place}: {who}, {frames} frames at {:.1} Hz{failed}",
+        "{place}: {who}{how}, {frames} frames at {:.1} Hz{failed}",
         shown.fps
     )
 }
@@ -254,7 +264,7 @@ impl Sinks {
 
 /// Writes beside the goal and renames, so that no half recording is ever found.
 pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
-    make_room(path, source)?;
+    make_room(path, source, "rrd")?;
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
     let mut builder = tempfile::Builder::new();
     builder.prefix(".mimic-").suffix(".rrd");

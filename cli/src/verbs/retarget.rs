@@ -56,7 +56,7 @@ impl Args {
             seconds,
         } = preparation.run(printer)?;
         let quality = motion.quality(&skeleton);
-        make_room(&output, &file)?;
+        make_room(&output, &file, "motion")?;
         let seconds = seconds.unwrap_or_default();
         motion
             .save(&output)

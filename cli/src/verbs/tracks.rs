@@ -69,18 +69,23 @@ impl Args {
             motion, skeleton, ..
         } = preparation.run(printer)?;
         if let Some(path) = &self.plot {
-            save(path, &preparation.file, &plot::tracks(&motion), printer)?;
+            save(
+                (path, "svg"),
+                &preparation.file,
+                &plot::tracks(&motion),
+                printer,
+            )?;
         }
         if let Some(path) = &self.csv {
-            save(path, &preparation.file, &table(&motion), printer)?;
+            save((path, "csv"), &preparation.file, &table(&motion), printer)?;
         }
         let report = report(&motion, &skeleton);
         printer.result(&report, || text(&report))
     }
 }
 
-fn save(path: &Path, input: &Path, text: &str, printer: &Printer) -> Outcome {
-    make_room(path, input)?;
+fn save((path, extension): (&Path, &str), input: &Path, text: &str, printer: &Printer) -> Outcome {
+    make_room(path, input, extension)?;
     write_whole(path, text.as_bytes())?;
     printer.note(format!("wrote {}", path.display()));
     Ok(())

@@ -14,7 +14,7 @@ use crate::printer::Printer;
 use crate::runs;
 use clap::ValueEnum;
 use mimic::learn::{Run, RunError, TrainError, Trainer};
-use mimic::task::{Perturbations, TaskError};
+use mimic::task::TaskError;
 use preset::Preset;
 use progress::Progress;
 use std::path::{Path, PathBuf};
@@ -64,7 +64,8 @@ pub struct Args {
     /// Change one value of the preset, e.g. `task.terminations.distance=0.4`; can be given several times
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<String>,
-    /// Disturb training by shoves, more or less weight and friction; `task.perturbations` has their ranges
+    /// Disturb training by shoves, more or less weight and friction, as the preset does or else usually (docs/presets.md);
+    /// `task.perturbations` has their ranges
     #[arg(long)]
     perturb: bool,
     /// Samples to learn from, e.g. 5M or 800k [default: as the preset says]
@@ -223,7 +224,8 @@ impl Args {
     fn preset(&self) -> Outcome<Preset> {
         let mut preset = Preset::load(&self.preset)?;
         if self.perturb {
-            preset.plan.task.perturbations = Perturbations::usual();
+            let task = &mut preset.plan.task;
+            task.perturbations = task.perturbations.or_usual();
         }
         preset.change(&self.set)?;
         let plan = &mut preset.plan;

@@ -1,5 +1,6 @@
 //! The `mimic` program as its users meet it.
 
+mod disturbed;
 mod edit;
 mod exit_codes;
 mod import;

@@ -148,3 +148,42 @@ fn doctor_reports_every_check() {
         assert!(checks.iter().any(|check| check["id"] == id), "{id}");
     }
 }
+
+/// A result takes the place of an older one of its kind, never of anything else.
+#[test]
+fn files_of_another_kind_are_spared() {
+    let bench = Workbench::with_run();
+    bench.write("other.txt", b"mine");
+    std::fs::create_dir(bench.path("copy")).expect("a folder can be made");
+    for file in ["config.json", "policy.safetensors"] {
+        let bytes = std::fs::read(bench.path("runs/sway").join(file)).expect("the run has it");
+        bench.write(&format!("copy/{file}"), &bytes);
+    }
+    for line in [
+        &["replay", "sway", "--save", "other.txt"][..],
+        &["replay", "sway", "--save", "copy/policy.safetensors"],
+        &["eval", "sway", "--out", "other.txt"],
+        &["eval", "sway", "--out", "copy/config.json"],
+        &["plot", "sway", "--out", "other.txt"],
+        &["import", "sway.txt", "--out", "other.txt"],
+        &["retarget", "sway.txt", "--out", "other.txt"],
+        &["tracks", "sway.txt", "--csv", "other.txt"],
+        &["info", "sway.txt", "--write-map", "other.txt"],
+    ] {
+        let file = line[line.len() - 1];
+        let before = std::fs::read(bench.path(file)).expect("it is there");
+        let said = bench.complaint(line, 2);
+        assert!(said.contains(file), "{line:?}: {said}");
+        assert_eq!(
+            std::fs::read(bench.path(file)).ok(),
+            Some(before),
+            "{line:?}"
+        );
+    }
+    for _ in 0..2 {
+        bench
+            .mimic(&["replay", "sway", "--save", "a.rrd"])
+            .assert()
+            .success();
+    }
+}

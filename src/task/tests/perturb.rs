@@ -59,9 +59,9 @@ fn after_a_shove_the_reference_is_where_the_agent_is() {
         let place = |links: &[LinkState]| links[0].pose.translation.vector;
         place(env.states()) - place(&wanted.links)
     };
-    // The first shove comes with the seventh step.
-    let before = apart(true, 6);
-    assert_eq!(before, apart(false, 6));
+    // The first shove comes with the eighth step.
+    let before = apart(true, 7);
+    assert_eq!(before, apart(false, 7));
     assert!(before.xy().norm() > 0.05, "{before}");
     let (beside, left_behind) = (apart(true, 12), apart(false, 12));
     assert!(beside.xy().norm() < 1e-4, "{beside}");

@@ -32,7 +32,11 @@ pub fn save(run: &Run, trainer: &Trainer) -> Result<(), RunError> {
 
 /// Measures and records what was learned.
 pub fn finish(run: &Run, printer: &Printer) -> Outcome {
-    let results = runs::evaluate(run, &Options::default(), printer)?;
+    let options = Options {
+        perturbations: runs::perturbations(run, false),
+        ..Options::default()
+    };
+    let results = runs::evaluate(run, &options, printer)?;
     runs::keep(run, &results)?;
     let recorded = record(run, printer)?;
     if printer.is_json() {
