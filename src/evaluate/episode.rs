@@ -25,6 +25,8 @@ pub struct Frame {
     pub terms: Terms,
     /// In (0, 1].
     pub reward: f32,
+    /// Impulse of the shove on the trunk that the step began with, N·s, world axes.
+    pub shove: Option<Vector3<f32>>,
 }
 
 /// How an episode begins.
@@ -223,6 +225,7 @@ impl Trace {
             contacts: self.contact_links.iter().map(contact).collect(),
             terms: step.terms,
             reward: step.reward,
+            shove: env.shove(),
         });
         match outcome {
             Outcome::Failed(failure) => self.failure = Some(failure),

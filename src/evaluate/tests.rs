@@ -44,6 +44,7 @@ fn trace(stage: &Stage, start: f64, change: impl Fn(usize, &mut Frame)) -> Trace
             contacts: vec![true, true],
             terms: Terms::default(),
             reward: 1.0,
+            shove: None,
         };
         change(f, &mut frame);
         frame

@@ -11,6 +11,7 @@ use super::stage::Stage;
 use super::terminate::{Failure, failure};
 use crate::sim::{Diverged, LinkState, Target, World};
 use crate::task::Dynamics;
+use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// How an episode stands after a step.
@@ -52,6 +53,8 @@ pub struct Imitate {
     /// Per contact link of the reference.
     touching: Vec<bool>,
     disturbance: Option<Disturbance>,
+    /// Impulse of a shove in the last step, N·s.
+    shove: Option<Vector3<f32>>,
 }
 
 impl Imitate {
@@ -64,6 +67,7 @@ impl Imitate {
             last_action: vec![0.0; stage.character.dof],
             touching: Vec::new(),
             disturbance: None,
+            shove: None,
             course: Course::new(stage.clone(), reference),
             stage,
             setting: *setting,
@@ -143,6 +147,7 @@ impl Imitate {
         self.touching.clone_from(&self.next.contacts);
         self.last_action.fill(0.0);
         self.disturbance = None;
+        self.shove = None;
         self.look_ahead();
     }
 
@@ -266,7 +271,7 @@ impl Imitate {
         );
         self.world.set_targets(&self.targets);
         self.last_action.copy_from_slice(action);
-        self.shove();
+        self.push();
     }
 
     /// What the control step that was taken has led to.
@@ -329,6 +334,11 @@ impl Imitate {
         &self.targets
     }
 
+    /// Impulse of the shove on the trunk that the last step began with, N·s, world axes.
+    pub fn shove(&self) -> Option<Vector3<f32>> {
+        self.shove
+    }
+
     /// Seconds since the episode began.
     pub fn elapsed(&self) -> f64 {
         self.elapsed
@@ -339,14 +349,15 @@ impl Imitate {
         self.course.time()
     }
 
-    fn shove(&mut self) {
+    fn push(&mut self) {
         let elapsed = self.elapsed;
         let push = self.disturbance.as_mut().and_then(|d| d.push(elapsed));
-        if let Some(change) = push {
+        let mass = self.stage.skeleton.total_mass() as f32;
+        self.shove = push.map(|change| change * mass);
+        if let Some(impulse) = self.shove {
             let trunk = self.stage.chest_body.unwrap_or(0);
             let link = self.stage.character.bodies[trunk].0;
-            let mass = self.stage.skeleton.total_mass() as f32;
-            self.world.push(link, change * mass);
+            self.world.push(link, impulse);
         }
     }
 

@@ -10,6 +10,7 @@ pub const GRID: Rgba = [255, 255, 255, 12];
 pub const PHASE: Rgba = [190, 196, 206, 255];
 pub const AGENT: Rgba = [255, 183, 77, 255];
 pub const REFERENCE: Rgba = [129, 199, 245, 255];
+pub const SHOVE: Rgba = [235, 87, 87, 255];
 pub const TRAIL: Rgba = [129, 199, 245, 120];
 
 /// Told apart also by those who see red and green alike.

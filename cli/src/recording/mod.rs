@@ -12,6 +12,7 @@ pub use write::{Sink, write};
 use mimic::motion::{Motion, Tracks};
 use mimic::skeleton::{Shape, Skeleton};
 use nalgebra::{Isometry3, Vector3};
+use serde::Serialize;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Side {
@@ -56,6 +57,15 @@ pub struct Curve {
     pub values: Vec<f64>,
 }
 
+/// What pushed the agent at once.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Shove {
+    /// From the first frame.
+    pub at_s: f64,
+    /// N·s.
+    pub impulse: [f32; 3],
+}
+
 /// All that is shown.
 pub struct Recording {
     pub name: String,
@@ -72,6 +82,9 @@ pub struct Recording {
     pub beside: f64,
     /// When the agent fails, seconds from the first frame.
     pub failed_s: Option<f64>,
+    pub shoves: Vec<Shove>,
+    /// Which part is shoved.
+    pub trunk: usize,
 }
 
 impl Recording {
@@ -88,6 +101,8 @@ impl Recording {
             rewards: Vec::new(),
             beside: 0.0,
             failed_s: None,
+            shoves: Vec::new(),
+            trunk: 0,
         }
     }
 

@@ -1,6 +1,6 @@
 //! An agent's episode as a recording.
 
-use super::{Actor, Curve, Recording, parts};
+use super::{Actor, Curve, Recording, Shove, parts};
 use mimic::evaluate::{Frame, Trace};
 use mimic::motion::Motion;
 use mimic::sim::LinkState;
@@ -38,6 +38,8 @@ impl Recording {
             failed_s: trace
                 .failure
                 .map(|_| trace.survived as f64 / trace.control_hz),
+            shoves: shoves(trace),
+            trunk: stage.chest_body.unwrap_or(0),
         }
     }
 }
@@ -71,6 +73,17 @@ fn poses(stage: &Stage, links: &[LinkState]) -> Vec<Isometry3<f64>> {
         link * offset
     };
     stage.character.bodies.iter().map(body).collect()
+}
+
+fn shoves(trace: &Trace) -> Vec<Shove> {
+    let frames = trace.frames.iter().enumerate();
+    let shove = |(number, frame): (usize, &Frame)| {
+        Some(Shove {
+            at_s: number as f64 / trace.control_hz,
+            impulse: frame.shove?.into(),
+        })
+    };
+    frames.filter_map(shove).collect()
 }
 
 fn rewards(frames: &[Frame]) -> Vec<Curve> {

@@ -14,6 +14,10 @@ const LONGEST_ARROW: f64 = 0.7;
 /// Angular momentum that is drawn that long at least, kg·m²/s: a still character shows no big arrows.
 const LEAST_MOMENTUM: f64 = 3.0;
 
+/// Impulse of a shove that is drawn as an arrow of a metre, N·s, and how long it is to be seen.
+const IMPULSE_PER_METER: f64 = 40.0;
+const SHOVE_SHOWN_S: f64 = 0.4;
+
 /// What the eye follows: the viewer frames its bounds, so two specks around the centre of mass give the distance.
 pub(super) const FOLLOWED: &str = "followed";
 /// From the centre of mass to each speck, metres.
@@ -38,6 +42,7 @@ pub fn log(
         momentum(stream, &branch, name, actor, per_meter, times)?;
         contacts(stream, &branch, name, shown, actor, times)?;
     }
+    shoves(stream, shown, times)?;
     trail(stream, shown)
 }
 
@@ -199,6 +204,40 @@ fn contacts(
         .with_positions(dots)
         .columns(lengths)?;
     stream.send_columns(path, times.to_vec(), dots)
+}
+
+/// An arrow that ends where the agent is shoved, for a moment.
+fn shoves(
+    stream: &RecordingStream,
+    shown: &Recording,
+    times: &[TimeColumn],
+) -> RecordingStreamResult<()> {
+    let Some(agent) = shown.agent.as_ref().filter(|_| !shown.shoves.is_empty()) else {
+        return Ok(());
+    };
+    let (mut ends, mut arrows, mut lengths) = (Vec::new(), Vec::new(), Vec::new());
+    for (frame, poses) in agent.poses.iter().enumerate() {
+        let now = frame as f64 / shown.fps;
+        let shove = shown.shoves.iter().rfind(|shove| shove.at_s <= now);
+        let shove = shove.filter(|shove| now < shove.at_s + SHOVE_SHOWN_S);
+        let before = arrows.len();
+        if let Some((shove, trunk)) = shove.zip(poses.get(shown.trunk)) {
+            let arrow = Vector3::from(shove.impulse.map(f64::from)) / IMPULSE_PER_METER;
+            ends.push(vec3(&(trunk.translation.vector - arrow)));
+            arrows.push(vec3(&arrow));
+        }
+        lengths.push(arrows.len() - before);
+    }
+    let path = "world/agent/shove";
+    let style = Arrows3D::update_fields()
+        .with_colors([look::color(look::SHOVE)])
+        .with_radii([0.025]);
+    stream.log_static(path, &style)?;
+    let arrows = Arrows3D::update_fields()
+        .with_origins(ends)
+        .with_vectors(arrows)
+        .columns(lengths)?;
+    stream.send_columns(path, times.to_vec(), arrows)
 }
 
 /// The way of the reference's centre of mass.

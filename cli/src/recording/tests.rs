@@ -64,6 +64,11 @@ fn waving() -> Recording {
             .collect(),
         beside: 0.0,
         failed_s: None,
+        shoves: vec![Shove {
+            at_s: 0.5,
+            impulse: [20.0, -10.0, 0.0],
+        }],
+        trunk: 0,
     }
 }
 

@@ -128,6 +128,7 @@ impl Args {
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
             "perturbed": self.perturb,
+            "shoves": shown.shoves,
             "failed_s": shown.failed_s,
         });
         printer.result(&json, || summary(&shown, saved.as_deref(), self.perturb))
@@ -213,7 +214,11 @@ fn summary(shown: &Recording, saved: Option<&Path>, perturbed: bool) -> String {
     let failed = shown.failed_s.map_or_else(String::new, |seconds| {
         format!("; the agent fails after {seconds:.1} s")
     });
-    let how = if perturbed { ", disturbed" } else { "" };
+    let how = match (perturbed, shown.shoves.len()) {
+        (false, _) => String::new(),
+        (true, 1) => ", disturbed, with 1 shove".to_owned(),
+        (true, count) => format!(", disturbed, with {count} shoves"),
+    };
     format!(
         "{place}: {who}{how}, {frames} frames at {:.1} Hz{failed}",
         shown.fps

@@ -217,6 +217,15 @@ fn it_is_said_when_the_agent_fails() {
     let shoved = bench.json(&[&line[..], &["--perturb"]].concat());
     let sooner = shoved["failed_s"].as_f64().expect("it fails");
     assert!(sooner < failed, "{shoved}, {failed} s without shoves");
+    assert_eq!(shown["shoves"], serde_json::json!([]));
+    let first = &shoved["shoves"][0];
+    let size = |axis: usize| first["impulse"][axis].as_f64().unwrap_or(f64::NAN);
+    // 45 kg by 3 m/s, with the step of 1/30 s that follows a tenth of a second.
+    assert!((size(0).hypot(size(1)) - 135.0).abs() < 0.1, "{first}");
+    assert!(
+        (first["at_s"].as_f64().unwrap_or(0.0) - 0.1).abs() < 0.04,
+        "{first}"
+    );
 }
 
 /// A viewer that does nothing but end like this.
