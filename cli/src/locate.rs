@@ -160,7 +160,11 @@ fn absent_run(wanted: &Path) -> Failure {
         Some(known) => format!("there are {known}"),
         None => "make one with `mimic train CLIP`".into(),
     };
-    Failure::input(wanted, format!("no run there or in `{RUNS}`; {hint}"))
+    let what = match wanted.is_file() {
+        true => "is a file, and a run is a folder".to_owned(),
+        false => format!("no run there or in `{RUNS}`"),
+    };
+    Failure::input(wanted, format!("{what}; {hint}"))
 }
 
 fn listing(paths: impl Iterator<Item = PathBuf>) -> Option<String> {

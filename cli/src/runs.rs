@@ -101,8 +101,9 @@ pub fn record(run: &Run, which: usize, opening: Opening, seconds: f64) -> Outcom
     let performer: Performer = run.performer().map_err(failure)?;
     let motion = run.motions().get(which).ok_or_else(|| {
         let count = run.motions().len();
+        let motions = if count == 1 { "motion" } else { "motions" };
         Failure::user(format!(
-            "`{}` learned {count} motions, there is no number {}",
+            "`{}` learned {count} {motions}, there is no number {}",
             run.dir().display(),
             which + 1
         ))

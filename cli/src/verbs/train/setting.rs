@@ -25,7 +25,10 @@ pub fn change(plan: &Plan, change: &str) -> Result<Plan, String> {
         .filter(|_| !path.is_empty())
         .ok_or_else(|| unknown(path, &known))?;
     let old = place.to_string();
-    *place = serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
+    *place = match serde_json::from_str(text) {
+        Err(e) if text.starts_with(['{', '[']) => return Err(format!("`{text}` is no JSON: {e}")),
+        value => value.unwrap_or_else(|_| Value::from(text)),
+    };
     serde_json::from_value(values).map_err(|e| format!("{e}; now it is {old}"))
 }
 
@@ -118,6 +121,7 @@ mod tests {
         assert!(said("ppo.gamma=high").ends_with("now it is 0.95"));
         assert!(said("task.actions.kind=absolute").contains("reach"));
         assert!(said("gamma").contains("ppo.gamma=0.99"));
+        assert!(said(r#"task.rewards={"pose": 1"#).contains("no JSON: EOF"));
         assert!(said("=3").contains("no setting"));
     }
 

@@ -61,6 +61,8 @@ fn what_is_not_there_cannot_go_on() {
     let bench = with_preset();
     let said = bench.complaint(&["train", "--resume", "nothing"], 2);
     assert!(said.contains("no run there"), "{said}");
+    let said = bench.complaint(&["eval", "sway.txt"], 2);
+    assert!(said.contains("a run is a folder"), "{said}");
     std::fs::write(bench.path("run"), b"").expect("a file can be written");
     bench.complaint(&SMALL, 1);
 }
