@@ -355,8 +355,7 @@ impl Imitate {
         let mass = self.stage.skeleton.total_mass() as f32;
         self.shove = push.map(|change| change * mass);
         if let Some(impulse) = self.shove {
-            let trunk = self.stage.chest_body.unwrap_or(0);
-            let link = self.stage.character.bodies[trunk].0;
+            let link = self.stage.character.bodies[self.stage.trunk()].0;
             self.world.push(link, impulse);
         }
     }

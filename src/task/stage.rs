@@ -71,6 +71,11 @@ impl Stage {
             character,
         })
     }
+
+    /// The body that is shoved: the chest, or the root where the skeleton has none.
+    pub fn trunk(&self) -> usize {
+        self.chest_body.unwrap_or(0)
+    }
 }
 
 fn soles(skeleton: &Skeleton, character: &Character) -> Vec<SolePoint> {

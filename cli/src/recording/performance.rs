@@ -39,7 +39,7 @@ impl Recording {
                 .failure
                 .map(|_| trace.survived as f64 / trace.control_hz),
             shoves: shoves(trace),
-            trunk: stage.chest_body.unwrap_or(0),
+            trunk: stage.trunk(),
         }
     }
 }

@@ -158,10 +158,7 @@ impl Args {
         }
         let which = self.motion.unwrap_or(1) - 1;
         let phase = self.phase.unwrap_or(0.0);
-        let perturbations = self
-            .perturb
-            .then(|| runs::perturbations(&run, true))
-            .flatten();
+        let perturbations = runs::perturbations(&run, true).filter(|_| self.perturb);
         let disturbed = perturbations.map(|ranges| (ranges, phase_number(phase)));
         let opening = (Start::At(phase), disturbed);
         runs::record(&run, which, opening, self.seconds.unwrap_or(SECONDS))

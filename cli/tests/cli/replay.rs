@@ -186,19 +186,15 @@ fn motions_of_a_run_are_shown_one_after_the_other() {
 /// A walk that was hardly practised ends on its nose within a second or two.
 #[test]
 fn it_is_said_when_the_agent_fails() {
-    let bench = Workbench::with_clip();
+    let bench = Workbench::with_run();
     let walk = concat!(env!("CARGO_MANIFEST_DIR"), "/../clips/walk.glb");
-    bench.write(
-        "small.json",
-        br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 64, "hidden": [8] }"#,
-    );
     let shoves = [
         "--set",
         "task.perturbations.push_m_s=[3,3]",
         "--set",
         "task.perturbations.push_interval_s=[0.1,0.1]",
     ];
-    let train = ["train", walk, "--preset", "small.json", "--out", "walking"];
+    let train = ["train", walk, "--preset", "tiny.json", "--out", "walking"];
     bench
         .mimic(&[&train[..], &shoves].concat())
         .assert()
