@@ -10,6 +10,7 @@
 
 pub mod clip;
 pub mod evaluate;
+pub mod explain;
 pub mod file;
 pub mod humanoid;
 pub mod import;

@@ -1,0 +1,175 @@
+//! What an error tells: which file, where in it, what is wrong, and what to do.
+//!
+//! Every error type of the library implements [`Explain`]. Its message is its [`Explanation`], written in one line; whoever
+//! shows errors in another way (as JSON, or with the name of the flag to change) takes the parts.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// An error that can tell its parts.
+pub trait Explain: std::error::Error {
+    /// The parts of the message.
+    fn explain(&self) -> Explanation;
+}
+
+/// The parts of an error's message. Displayed, they make one line: `` `file`: place: cause; advice ``.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Explanation {
+    /// Who can mend it.
+    pub fault: Fault,
+    /// The file at fault.
+    pub file: Option<PathBuf>,
+    /// Where in the file: a joint, a frame, a line, a byte, a field.
+    pub place: Option<String>,
+    /// What is wrong, without file, place and advice.
+    pub cause: String,
+    /// What to do about it.
+    pub remedy: Option<Remedy>,
+}
+
+/// Who can mend an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The caller: a wrong file, or a value out of range.
+    Input,
+    /// Nobody beforehand: the input was right and the work failed, with a full disk for one.
+    Work,
+}
+
+/// What to do about an error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Remedy {
+    /// In words, beginning with a verb.
+    pub advice: String,
+    /// The parameter to change, where there is one. A command line knows which flag sets it.
+    pub parameter: Option<Parameter>,
+}
+
+/// What a caller can set, by the name that it has in the library's options.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Parameter {
+    /// Which take of a file is imported.
+    Take,
+    /// Frames per second of a clip.
+    FrameRate,
+    /// The part of a take that is kept, seconds.
+    Trim,
+    /// Metres per unit of length of a file.
+    Unit,
+    /// The axis that points up in a file.
+    UpAxis,
+    /// Whether a clip repeats.
+    LoopMode,
+    /// Which joint is which slot of the humanoid.
+    JointMap,
+    /// The physics skeleton.
+    Skeleton,
+    /// How fast a clip is played.
+    Speed,
+    /// Where the result is written.
+    Output,
+}
+
+impl Explanation {
+    /// What a caller did wrong.
+    pub fn input(cause: impl Into<String>) -> Self {
+        Self {
+            fault: Fault::Input,
+            file: None,
+            place: None,
+            cause: cause.into(),
+            remedy: None,
+        }
+    }
+
+    /// What failed although everything was right.
+    pub fn work(cause: impl Into<String>) -> Self {
+        Self {
+            fault: Fault::Work,
+            ..Self::input(cause)
+        }
+    }
+
+    /// Names the file at fault.
+    #[must_use]
+    pub fn file(mut self, path: impl AsRef<Path>) -> Self {
+        self.file = Some(path.as_ref().to_owned());
+        self
+    }
+
+    /// Says where in the file.
+    #[must_use]
+    pub fn place(mut self, place: impl Into<String>) -> Self {
+        self.place = Some(place.into());
+        self
+    }
+
+    /// Says what to do; `advice` begins with a verb.
+    #[must_use]
+    pub fn remedy(mut self, advice: impl Into<String>) -> Self {
+        self.remedy = Some(Remedy {
+            advice: advice.into(),
+            parameter: None,
+        });
+        self
+    }
+
+    /// Says what to do, and which parameter to change for that.
+    #[must_use]
+    pub fn remedy_by(mut self, parameter: Parameter, advice: impl Into<String>) -> Self {
+        self.remedy = Some(Remedy {
+            advice: advice.into(),
+            parameter: Some(parameter),
+        });
+        self
+    }
+}
+
+impl fmt::Display for Explanation {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(f, "`{}`: ", file.display())?;
+        }
+        if let Some(place) = &self.place {
+            write!(f, "{place}: ")?;
+        }
+        f.write_str(&self.cause)?;
+        match &self.remedy {
+            Some(remedy) => write!(f, "; {}", remedy.advice),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Makes an error of a type that implements [`Explain`]: its message is its explanation.
+macro_rules! explained {
+    ($error:ty) => {
+        impl std::fmt::Display for $error {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                std::fmt::Display::fmt(&$crate::explain::Explain::explain(self), f)
+            }
+        }
+        impl std::error::Error for $error {}
+    };
+}
+pub(crate) use explained;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_has_its_parts_in_order() {
+        let bare = Explanation::input("it is empty");
+        assert_eq!(bare.to_string(), "it is empty");
+        let whole = bare
+            .file("kick.fbx")
+            .place("take `Kick`")
+            .remedy_by(Parameter::Take, "choose another take");
+        assert_eq!(
+            whole.to_string(),
+            "`kick.fbx`: take `Kick`: it is empty; choose another take"
+        );
+    }
+}
