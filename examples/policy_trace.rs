@@ -6,7 +6,7 @@
 use mimic::learn::{Memory, Run};
 use mimic::sim::Target;
 use mimic::task::{Imitate, Outcome, Stage};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::Path;
@@ -45,14 +45,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Time, and of every body its position, rotation (scalar first), velocity of its origin and angular velocity.
 fn state(stage: &Stage, env: &Imitate) -> Value {
     let (mut position, mut rotation, mut linear, mut angular) = (vec![], vec![], vec![], vec![]);
-    for (link, offset) in &stage.character.bodies {
-        let state = env.states()[*link];
-        let pose = state.pose * offset.cast::<f32>();
-        let arm = pose.translation.vector - state.pose.translation.vector;
-        position.push(json!(pose.translation.vector.as_slice()));
-        rotation.push(quaternion(&pose.rotation));
-        let velocity: Vector3<f32> = state.linear + state.angular.cross(&arm);
-        linear.push(json!(velocity.as_slice()));
+    for body in 0..stage.character.bodies.len() {
+        let state = stage.character.body_state(env.states(), body);
+        position.push(json!(state.pose.translation.vector.as_slice()));
+        rotation.push(quaternion(&state.pose.rotation));
+        linear.push(json!(state.linear.as_slice()));
         angular.push(json!(state.angular.as_slice()));
     }
     json!({

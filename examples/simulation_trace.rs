@@ -62,9 +62,9 @@ fn targets(character: &Character, control: &[f32]) -> Vec<Target> {
 }
 
 fn positions(character: &Character, states: &[LinkState]) -> Vec<Vec<f32>> {
-    let place = |&(link, offset): &(usize, nalgebra::Isometry3<f64>)| {
-        let pose = states[link].pose * offset.cast::<f32>();
+    let position = |body| {
+        let pose = character.body_pose(states, body);
         pose.translation.vector.as_slice().to_vec()
     };
-    character.bodies.iter().map(place).collect()
+    (0..character.bodies.len()).map(position).collect()
 }

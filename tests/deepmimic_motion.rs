@@ -2,7 +2,7 @@
 
 use mimic::clip::LoopMode;
 use mimic::motion::{Cycle, Draft, Motion};
-use mimic::skeleton::Skeleton;
+use mimic::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
@@ -92,7 +92,7 @@ fn stance_share(motion: &Motion, foot: usize) -> f64 {
 
 /// Residual force in body weights, per frame.
 fn residual_force(skeleton: &Skeleton, motion: &Motion) -> Vec<f64> {
-    let weight = skeleton.total_mass() * 9.81;
+    let weight = skeleton.total_mass() * GRAVITY;
     let residuals = motion.tracks.root_wrench_residual.iter();
     residuals
         .map(|w| w.fixed_rows::<3>(0).norm() / weight)

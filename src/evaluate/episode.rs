@@ -7,7 +7,7 @@ use crate::task::{
     Dynamics, Failure, Imitate, Outcome, Perturbations, Reference, Sample, Setting, Stage, Step,
     Terminations, Terms,
 };
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 /// Mean distance of the bodies from their reference beyond which an episode has failed, metres.
 const LOST_M: f32 = 0.5;
@@ -240,9 +240,8 @@ pub(super) fn positions<'a>(
     stage: &'a Stage,
     links: &'a [LinkState],
 ) -> impl Iterator<Item = Vector3<f32>> + 'a {
-    stage.character.bodies.iter().map(|(link, offset)| {
-        (links[*link].pose * Point3::from(offset.translation.vector.cast::<f32>())).coords
-    })
+    let bodies = 0..stage.character.bodies.len();
+    bodies.map(|b| stage.character.body_pose(links, b).translation.vector)
 }
 
 fn mean_distance(stage: &Stage, a: &[LinkState], b: &[LinkState]) -> f32 {

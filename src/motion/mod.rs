@@ -20,7 +20,6 @@ pub use build::Draft;
 pub use error::MotionError;
 pub use quality::Check;
 pub use summary::{ContactShare, Extent, Summary};
-pub(crate) use wrench::GRAVITY;
 
 use crate::clip::LoopMode;
 use nalgebra::{Isometry3, Vector3, Vector6};

@@ -3,7 +3,7 @@
 use super::skate::sole_speed;
 use super::{Motion, wrench};
 use crate::clip::Severity;
-use crate::skeleton::{JointKind, Skeleton, limits};
+use crate::skeleton::{GRAVITY, JointKind, Skeleton, limits};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -169,7 +169,7 @@ impl Motion {
         let depth = |f: usize| -skeleton.lowest_point(&self.bodies[f]);
         let outside = |f: usize| limits::violations(skeleton, &self.qpos[f]) as f64;
         let speeds = self.sole_speeds(skeleton);
-        let weight = skeleton.total_mass() * wrench::GRAVITY;
+        let weight = skeleton.total_mass() * GRAVITY;
         let missing: Vec<f64> = self.tracks.unsupported_force().collect();
         let clear = OFF_GROUND * skeleton.leg_length();
         let high = |f: usize| {

@@ -1,9 +1,9 @@
 //! A motion between its frames and beyond its ends.
 
+use super::Motion;
 use super::velocity::{blend, moved, turned};
-use super::{GRAVITY, Motion};
 use crate::clip::LoopMode;
-use crate::skeleton::Skeleton;
+use crate::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 /// A body whose acceleration is as near to gravity as this falls freely, m/s².

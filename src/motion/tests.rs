@@ -1,6 +1,6 @@
 use super::contact;
 use super::*;
-use crate::skeleton::Skeleton;
+use crate::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 fn humanoid() -> Skeleton {
@@ -172,7 +172,7 @@ fn standing_is_explained_by_the_feet() {
     let still = steady(&s, &vec![0.0; s.nv], 12, 30.0);
     let standing = Motion::from_poses(&s, draft(&s, still.clone(), 30.0));
     assert!(standing.tracks.contact.iter().flatten().all(|c| *c));
-    let weight = s.total_mass() * 9.81;
+    let weight = s.total_mass() * GRAVITY;
     for w in &standing.tracks.root_wrench_residual {
         assert!(w.norm() < 1e-6 * weight);
     }
@@ -203,7 +203,7 @@ fn lying_is_explained_by_what_lies_on_the_ground() {
         contact: Some(vec![vec![false; 2]; 12]),
         ..draft(&s, vec![lying; 12], 30.0)
     };
-    let weight = s.total_mass() * 9.81;
+    let weight = s.total_mass() * GRAVITY;
     for w in &Motion::from_poses(&s, none).tracks.root_wrench_residual {
         assert!(w.fixed_rows::<3>(0).norm() < 0.05 * weight, "{w}");
     }
@@ -216,7 +216,7 @@ fn free_fall_needs_nothing() {
     for (f, q) in qpos.iter_mut().enumerate() {
         let t = f as f64 / 60.0;
         q[0] += 2.0 * t;
-        q[2] += 5.0 + 3.0 * t - 0.5 * 9.81 * t * t;
+        q[2] += 5.0 + 3.0 * t - 0.5 * GRAVITY * t * t;
     }
     let motion = Motion::from_poses(&s, draft(&s, qpos, 60.0));
     assert!(motion.tracks.contact.iter().flatten().all(|c| !c));

@@ -7,7 +7,7 @@
 use super::Motion;
 use super::timeline::Timeline;
 use super::wrench::{self, Load, Standing, Support, Wrench};
-use crate::skeleton::{Joint, JointKind, Skeleton};
+use crate::skeleton::{GRAVITY, Joint, JointKind, Skeleton};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 impl Motion {
@@ -82,7 +82,7 @@ fn needs(motion: &Motion, skeleton: &Skeleton, timeline: &Timeline) -> Vec<Vec<W
         let (_, acceleration) = wrench::derivatives(f, motion.fps, timeline, place);
         let (moment, _) = wrench::derivatives(f, motion.fps, timeline, spin);
         Wrench {
-            force: (acceleration + Vector3::z() * wrench::GRAVITY) * body.mass,
+            force: (acceleration + Vector3::z() * GRAVITY) * body.mass,
             moment,
         }
     };

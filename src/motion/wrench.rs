@@ -6,12 +6,10 @@
 
 use super::nnls;
 use super::timeline::Timeline;
-use crate::skeleton::Skeleton;
+use crate::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3, Vector6};
 use std::f64::consts::TAU;
 
-/// Earth's standard gravity as MuJoCo's default has it, m/s².
-pub(crate) const GRAVITY: f64 = 9.81;
 /// Half width of the window in which accelerations are fitted, s.
 const SMOOTHING: f64 = 0.05;
 /// Points of a body this close to its lowest one can carry load, in leg lengths.

@@ -11,7 +11,8 @@ use super::spin;
 use super::stance::{Anchor, TOUCHES, carries};
 use crate::clip::{Problem, Severity};
 use crate::humanoid::Slot;
-use crate::motion::{Cycle, GRAVITY};
+use crate::motion::Cycle;
+use crate::skeleton::GRAVITY;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Height of the lowest point from which on a body is in the air, and that it reaches in a flight, leg lengths.

@@ -79,14 +79,24 @@ pub struct Link {
     pub friction: f64,
 }
 
-/// The character as a tree of links. Parents stand before their children.
+/// How a body of the skeleton sits on the link that carries it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attachment {
+    /// Index of the link.
+    pub link: usize,
+    /// The body's frame in the link's; the identity for the body whose frame the link has.
+    pub link_from_body: Isometry3<f64>,
+}
+
+/// The character as a tree of links. Parents come before their children.
 #[derive(Clone, Debug)]
 pub struct Character {
+    /// The links, parents before children.
     pub links: Vec<Link>,
-    /// Drive coordinates in all.
+    /// Number of drive coordinates of all links together.
     pub dof: usize,
-    /// For every body of the skeleton: its link, and the transform link from body.
-    pub bodies: Vec<(usize, Isometry3<f64>)>,
+    /// Where each body of the skeleton sits, in the skeleton's order.
+    pub bodies: Vec<Attachment>,
 }
 
 impl Character {
@@ -122,15 +132,18 @@ impl Character {
                 body: body.name.clone(),
             });
         }
-        let at = parent.map(|p| self.bodies[p]);
+        let carrier = parent.map(|p| self.bodies[p]);
         let dof = self.dof;
         self.dof += joint.dof();
-        self.bodies.push((self.links.len(), Isometry3::identity()));
+        self.bodies.push(Attachment {
+            link: self.links.len(),
+            link_from_body: Isometry3::identity(),
+        });
         self.links.push(Link {
             name: body.name.clone(),
             body: index,
-            parent: at.map(|(link, _)| link),
-            rest: at.map_or_else(Isometry3::identity, |(_, offset)| offset * body.rest),
+            parent: carrier.map(|c| c.link),
+            rest: carrier.map_or_else(Isometry3::identity, |c| c.link_from_body * body.rest),
             joint,
             anchor: body
                 .joints
@@ -147,9 +160,15 @@ impl Character {
     }
 
     fn weld(&mut self, body: &Body, parent: usize) {
-        let (link, offset) = self.bodies[parent];
-        let at = offset * body.rest;
-        self.bodies.push((link, at));
+        let Attachment {
+            link,
+            link_from_body,
+        } = self.bodies[parent];
+        let at = link_from_body * body.rest;
+        self.bodies.push(Attachment {
+            link,
+            link_from_body: at,
+        });
         let link = &mut self.links[link];
         link.shapes
             .extend(body.shapes.iter().map(|shape| moved(shape, &at)));
@@ -175,6 +194,44 @@ impl Character {
             angular: twists[link.body].angular.cast(),
         };
         self.links.iter().map(state).collect()
+    }
+
+    /// World from body: the pose of a body of the skeleton, given the states of all links.
+    ///
+    /// # Panics
+    /// Where the skeleton has no such body, or `links` are fewer than the character's.
+    #[inline]
+    pub fn body_pose(&self, links: &[LinkState], body: usize) -> Isometry3<f32> {
+        let at = &self.bodies[body];
+        links[at.link].pose * at.link_from_body.cast::<f32>()
+    }
+
+    /// World from body of every body of the skeleton, in double precision, for pictures and files.
+    ///
+    /// # Panics
+    /// Where `links` are fewer than the character's.
+    pub fn body_poses(&self, links: &[LinkState]) -> Vec<Isometry3<f64>> {
+        let pose = |at: &Attachment| links[at.link].pose.cast::<f64>() * at.link_from_body;
+        self.bodies.iter().map(pose).collect()
+    }
+
+    /// Pose and velocity of a body of the skeleton, given the states of all links.
+    ///
+    /// A body welded to a link turns with it, ω = ω_link, and its origin moves with v = v_link + ω × r, where r leads
+    /// from the link's origin to the body's.
+    ///
+    /// # Panics
+    /// Where the skeleton has no such body, or `links` are fewer than the character's.
+    #[inline]
+    pub fn body_state(&self, links: &[LinkState], body: usize) -> LinkState {
+        let link = &links[self.bodies[body].link];
+        let pose = self.body_pose(links, body);
+        let arm = pose.translation.vector - link.pose.translation.vector;
+        LinkState {
+            pose,
+            linear: link.linear + link.angular.cross(&arm),
+            angular: link.angular,
+        }
     }
 
     /// Joint rotation of link `link` from the rotations of all links: identity at rest.

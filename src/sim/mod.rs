@@ -11,7 +11,7 @@ mod tests;
 mod world;
 
 pub use articulated::LANES;
-pub use character::{Character, HingeAxis, Link, LinkJoint};
+pub use character::{Attachment, Character, HingeAxis, Link, LinkJoint};
 pub use world::{LinkState, Target, World};
 
 use serde::{Deserialize, Serialize};

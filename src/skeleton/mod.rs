@@ -25,6 +25,11 @@ use crate::humanoid::Slot;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
+/// Acceleration of gravity, m/s², along −Z: MuJoCo's default (`option/gravity`), so that both engines weigh alike.
+///
+/// It differs by 0.03 % from the standard gravity of 9.80665 m/s² (3rd CGPM, 1901).
+pub const GRAVITY: f64 = 9.81;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKind {
     Free,

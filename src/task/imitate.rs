@@ -355,7 +355,7 @@ impl Imitate {
         let mass = self.stage.skeleton.total_mass() as f32;
         self.shove = push.map(|change| change * mass);
         if let Some(impulse) = self.shove {
-            let link = self.stage.character.bodies[self.stage.trunk()].0;
+            let link = self.stage.character.bodies[self.stage.trunk()].link;
             self.world.push(link, impulse);
         }
     }

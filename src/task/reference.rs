@@ -89,7 +89,7 @@ impl Reference {
             contact_links: motion
                 .contact_bodies
                 .iter()
-                .map(|&b| stage.character.bodies[b].0)
+                .map(|&b| stage.character.bodies[b].link)
                 .collect(),
         })
     }

@@ -4,7 +4,7 @@ use super::reward::joint_weights;
 use super::setting::TaskError;
 use crate::humanoid::Slot;
 use crate::sim::{Character, Link};
-use crate::skeleton::{Shape, Skeleton};
+use crate::skeleton::{GRAVITY, Shape, Skeleton};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 /// Points this little above the lowest one are of the sole, metres.
@@ -66,7 +66,7 @@ impl Stage {
             soles: soles(&skeleton, &character),
             end_bodies,
             joint_weights: joint_weights(&skeleton, &character),
-            momentum_scale: (skeleton.total_mass() * leg * (9.81 * leg).sqrt()) as f32,
+            momentum_scale: (skeleton.total_mass() * leg * (GRAVITY * leg).sqrt()) as f32,
             skeleton,
             character,
         })
@@ -83,7 +83,7 @@ fn soles(skeleton: &Skeleton, character: &Character) -> Vec<SolePoint> {
     let feet = [Slot::LeftFoot, Slot::RightFoot];
     let feet = feet.iter().filter_map(|slot| skeleton.slots.get(slot));
     feet.flat_map(|&foot| {
-        let link = character.bodies[foot].0;
+        let link = character.bodies[foot].link;
         let upright = rest[character.links[link].body].rotation;
         sole(link, &character.links[link], &upright)
     })

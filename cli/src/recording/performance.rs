@@ -13,11 +13,12 @@ impl Recording {
     pub fn of_trace(name: &str, trace: &Trace, motion: &Motion, stage: &Stage) -> Self {
         let skeleton: &Skeleton = &stage.skeleton;
         let frames = &trace.frames;
-        let agent = |f: &Frame| (poses(stage, &f.agent), f.dynamics, f.contacts.clone());
+        let bodies = |links: &[LinkState]| stage.character.body_poses(links);
+        let agent = |f: &Frame| (bodies(&f.agent), f.dynamics, f.contacts.clone());
         let reference = |f: &Frame| {
             let sample = &f.reference;
             (
-                poses(stage, &sample.links),
+                bodies(&sample.links),
                 sample.dynamics,
                 sample.contacts.clone(),
             )
@@ -62,17 +63,6 @@ impl Actor {
         }
         actor
     }
-}
-
-/// World transforms of all bodies, from those of the links that carry them.
-fn poses(stage: &Stage, links: &[LinkState]) -> Vec<Isometry3<f64>> {
-    let body = |(link, offset): &(usize, Isometry3<f64>)| {
-        let link = links
-            .get(*link)
-            .map_or_else(Isometry3::identity, |link| link.pose.cast());
-        link * offset
-    };
-    stage.character.bodies.iter().map(body).collect()
 }
 
 fn shoves(trace: &Trace) -> Vec<Shove> {

@@ -16,7 +16,7 @@ fn leap(skeleton: &Skeleton) -> Vec<Vec<f64>> {
         let mut qpos = skeleton.rest_qpos();
         let low = skeleton.lowest_point(&skeleton.forward(&qpos));
         let duration = FLIES as f64 / FPS;
-        qpos[2] += crate::motion::GRAVITY * duration * duration * u * (1.0 - u) / 2.0 - low;
+        qpos[2] += crate::skeleton::GRAVITY * duration * duration * u * (1.0 - u) / 2.0 - low;
         let wave = (std::f64::consts::PI * u).sin();
         let root = UnitQuaternion::from_euler_angles(0.1 * wave, 0.2 * wave * wave, 0.6 * u);
         put_quaternion(&mut qpos, 3, &root);

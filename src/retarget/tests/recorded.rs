@@ -92,7 +92,7 @@ fn a_backflip_of_few_frames_falls_freely() {
     let com = &motion.tracks.com;
     for f in at(0.72)..at(1.12) {
         let acceleration = (com[f + 1] - com[f] * 2.0 + com[f - 1]) * motion.fps.powi(2);
-        let off = acceleration + Vector3::z() * crate::motion::GRAVITY;
+        let off = acceleration + Vector3::z() * crate::skeleton::GRAVITY;
         assert!(off.norm() < 0.05, "{f}: {off}");
     }
 }
@@ -156,7 +156,7 @@ fn a_jump_falls_and_spins_freely() {
     for f in flight {
         let acceleration = (velocity[f + 1] - velocity[f - 1]) * (motion.fps / 2.0);
         assert!(
-            (acceleration + Vector3::z() * crate::motion::GRAVITY).norm() < 0.3,
+            (acceleration + Vector3::z() * crate::skeleton::GRAVITY).norm() < 0.3,
             "{f}"
         );
     }

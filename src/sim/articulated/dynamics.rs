@@ -7,8 +7,9 @@ use super::pose::Pose;
 use super::spatial::{Force, Inertia, Motion};
 use super::state::State;
 use super::tree::{Gains, Joint, Tree};
+use crate::skeleton;
 
-const GRAVITY: f32 = 9.81;
+const GRAVITY: f32 = skeleton::GRAVITY as f32;
 /// Stiffness of a stop, as a share of inertia / dt².
 const STOP: f32 = 4.0;
 

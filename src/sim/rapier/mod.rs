@@ -12,6 +12,7 @@ mod convert;
 use super::character::Character;
 use super::world::{LinkState, Target};
 use super::{Diverged, Settings};
+use crate::skeleton::GRAVITY;
 use build::{Built, Scene};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
@@ -151,7 +152,7 @@ impl Rapier {
     pub fn step(&mut self) -> Result<(), Diverged> {
         for _ in 0..self.settings.steps_per_control {
             self.pipeline.step(
-                Vector::new(0.0, 0.0, -9.81),
+                Vector::new(0.0, 0.0, -GRAVITY as f32),
                 &self.parameters,
                 &mut self.scene.islands,
                 &mut self.scene.broad_phase,

@@ -22,7 +22,7 @@ mod joints;
 mod together;
 
 use super::*;
-use crate::skeleton::Skeleton;
+use crate::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 on_both_engines!(
@@ -149,7 +149,7 @@ fn in_flight_gravity_alone_changes_momentum_while_limbs_move(settings: Settings)
         moved = moved.max(a.pose.rotation.angle_to(&b.pose.rotation));
         let t = (step + 1) as f64 / 30.0;
         let (p, l, _) = momenta(&character, world.states());
-        let expected = p0 + Vector3::new(0.0, 0.0, -9.81 * mass * t);
+        let expected = p0 + Vector3::new(0.0, 0.0, -GRAVITY * mass * t);
         assert!(
             (p - expected).norm() < 1e-3 * p0.norm(),
             "linear momentum {p:?}, not {expected:?}, after {t} s"
@@ -277,7 +277,7 @@ fn a_sliding_box_stops_by_coulomb_friction(settings: Settings) {
         world.step().expect("sliding stays finite");
     }
     let way = world.states()[0].pose.translation.vector.xy().norm();
-    let expected = speed * speed / (2.0 * friction * 9.81);
+    let expected = speed * speed / (2.0 * friction * GRAVITY as f32);
     assert!(
         (way - expected).abs() < 0.05 * expected,
         "slid {way} m, not v²/2μg = {expected} m"

@@ -3,7 +3,7 @@
 //! as in its published program (marathon-envs, StyleTransfer002): the targets before, and three sensors under each foot.
 //! On `skeletons/marathon.xml`, 17 bodies and 21 drives, these are the paper's 258 numbers.
 
-use super::{Scene, Writer, body_state};
+use super::{Scene, Writer};
 use crate::task::Stage;
 use nalgebra::Point3;
 
@@ -34,8 +34,9 @@ pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
     let start = scene.next.anchor;
     let axes = start.rotation.inverse();
     let root = &scene.links[0];
-    let bodies =
-        || (0..stage.character.bodies.len()).map(|b| (b, body_state(stage, scene.links, b)));
+    let bodies = || {
+        (0..stage.character.bodies.len()).map(|b| (b, stage.character.body_state(scene.links, b)))
+    };
     w.one(scene.next.phase);
     for (b, body) in bodies() {
         let at = body.pose.translation.vector;

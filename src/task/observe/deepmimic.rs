@@ -1,7 +1,7 @@
 //! The state of Peng et al. 2018, "DeepMimic", section 4, with rotations as two axes as in the authors' program: of 15
 //! bodies 227 numbers.
 
-use super::{Scene, Writer, body_state};
+use super::{Scene, Writer};
 use crate::task::Stage;
 use crate::task::reference::heading;
 use nalgebra::Vector3;
@@ -23,7 +23,8 @@ pub(super) fn layout(stage: &Stage) -> Vec<(&'static str, usize)> {
 pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
     let root = &scene.links[0].pose;
     let turn = heading(&root.rotation).inverse();
-    let bodies = || (0..stage.character.bodies.len()).map(|b| body_state(stage, scene.links, b));
+    let bodies =
+        || (0..stage.character.bodies.len()).map(|b| stage.character.body_state(scene.links, b));
     w.one(2.0 * scene.next.phase - 1.0);
     w.one(root.translation.z);
     for body in bodies() {

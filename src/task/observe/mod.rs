@@ -66,19 +66,6 @@ pub fn observe(kind: Observations, stage: &Stage, scene: &Scene, out: &mut [f32]
     }
 }
 
-/// Position and velocity of a body's origin, its rotation and angular velocity, in world axes.
-fn body_state(stage: &Stage, links: &[LinkState], body: usize) -> LinkState {
-    let (link, offset) = &stage.character.bodies[body];
-    let state = &links[*link];
-    let pose = state.pose * offset.cast::<f32>();
-    let arm = pose.translation.vector - state.pose.translation.vector;
-    LinkState {
-        pose,
-        linear: state.linear + state.angular.cross(&arm),
-        angular: state.angular,
-    }
-}
-
 /// Writes values one after the other.
 struct Writer<'a> {
     out: &'a mut [f32],

@@ -59,10 +59,8 @@ pub(super) fn observe(stage: &Stage, scene: &Scene, w: &mut Writer) {
     joints(stage, w, |i, p| relative(stage, links, i, p).scaled_axis());
     joints(stage, w, |i, p| rate(links, i, p));
     for &body in &stage.key_bodies {
-        let (link, offset) = &stage.character.bodies[body];
-        let at =
-            links[*link].pose * nalgebra::Point3::from(offset.translation.vector.cast::<f32>());
-        w.vector(into_root(at.coords - center));
+        let at = stage.character.body_pose(links, body).translation;
+        w.vector(into_root(at.vector - center));
     }
     w.vector(into_root(dynamics.com - center));
     w.vector(into_root(dynamics.com_velocity));

@@ -25,8 +25,8 @@ pub(super) fn terms(
     (wanted, wanted_dynamics): (&[LinkState], &Dynamics),
 ) -> Terms {
     let (mut rotation, mut spin) = (0.0, 0.0);
-    for (link, _) in &stage.character.bodies {
-        let (mine, other) = (in_root(links, *link), in_root(wanted, *link));
+    for body in &stage.character.bodies {
+        let (mine, other) = (in_root(links, body.link), in_root(wanted, body.link));
         rotation += mine.0.angle_to(&other.0).powi(2);
         spin += (mine.1 - other.1).norm_squared();
     }

@@ -12,7 +12,7 @@ use super::dynamics::Dynamics;
 use super::setting::Rewards;
 use super::stage::Stage;
 use crate::sim::LinkState;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Names of the terms, in the order of [`Terms::values`].
@@ -162,11 +162,8 @@ fn joint_error(stage: &Stage, agent: &[LinkState], reference: &[LinkState], i: u
 
 /// World position (m) and velocity (m/s) of a body's origin.
 fn body(stage: &Stage, links: &[LinkState], body: usize) -> (Vector3<f32>, Vector3<f32>) {
-    let (link, offset) = &stage.character.bodies[body];
-    let state = &links[*link];
-    let at = (state.pose * Point3::from(offset.translation.vector.cast::<f32>())).coords;
-    let arm = at - state.pose.translation.vector;
-    (at, state.linear + state.angular.cross(&arm))
+    let state = stage.character.body_state(links, body);
+    (state.pose.translation.vector, state.linear)
 }
 
 /// Squared errors of positions (m²) and velocities ((m/s)²), summed over bodies.

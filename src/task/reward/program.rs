@@ -60,7 +60,7 @@ fn seen(stage: &Stage, links: &[LinkState], end: usize) -> Vector3<f32> {
 pub(crate) fn joint_weights(skeleton: &Skeleton, character: &Character) -> Vec<f32> {
     let mut slotted: Vec<Option<f32>> = vec![None; character.links.len()];
     for (slot, body) in &skeleton.slots {
-        let weighs = &mut slotted[character.bodies[*body].0];
+        let weighs = &mut slotted[character.bodies[*body].link];
         *weighs = Some(weighs.unwrap_or(0.0).max(weight(*slot)));
     }
     slotted[0] = Some(weight(Slot::Hips));
