@@ -3,8 +3,8 @@
 use mimic::clip::LoopMode;
 use mimic::motion::{Cycle, Draft, Motion};
 use mimic::skeleton::{GRAVITY, Skeleton};
+use mimic_test_support::foreign;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use std::path::Path;
 
 /// The clips' bodies in order after the root, and whether their rotation is a hinge angle.
 const JOINTS: [(&str, bool); 12] = [
@@ -47,12 +47,8 @@ fn frame(skeleton: &Skeleton, row: &[f64], near: Option<&[f64]>) -> Vec<f64> {
 
 /// `None`, with a message, where the clip is not there.
 fn motion(clip: &str) -> Option<(Skeleton, Motion)> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/deepmimic");
-    let path = Path::new(folder).join(format!("humanoid3d_{clip}.txt"));
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    };
+    let path = foreign(&format!("deepmimic/humanoid3d_{clip}.txt"))?;
+    let text = std::fs::read_to_string(path).expect("the clip can be read");
     let json: serde_json::Value = serde_json::from_str(&text).expect("the clip is JSON");
     let rows: Vec<Vec<f64>> = serde_json::from_value(json["Frames"].clone()).expect("has frames");
     let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid is valid");

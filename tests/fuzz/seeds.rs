@@ -5,6 +5,7 @@ use super::glb::Glb;
 use super::random::Random;
 use super::text::Text;
 use super::{json, plain};
+use mimic_test_support::foreign;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -103,7 +104,9 @@ pub struct Seed {
 pub fn all() -> Vec<Seed> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let ours = OURS.map(|(kind, name)| (kind, root.join("clips").join(name)));
-    let theirs = THEIRS.map(|(kind, name)| (kind, root.join("../shared/data").join(name)));
+    let theirs = THEIRS
+        .into_iter()
+        .filter_map(|(kind, name)| Some((kind, foreign(name)?)));
     let files = ours.into_iter().chain(theirs);
     let can_be_read = |kind: &str| cfg!(feature = "ufbx") || !kind.ends_with(" FBX");
     let files = files.filter(|(kind, _)| can_be_read(kind));
@@ -111,10 +114,7 @@ pub fn all() -> Vec<Seed> {
 }
 
 fn seed(kind: &'static str, path: &Path) -> Option<Seed> {
-    let Ok(mut bytes) = std::fs::read(path) else {
-        eprintln!("skipped: no {}", path.display());
-        return None;
-    };
+    let mut bytes = std::fs::read(path).expect("a seed can be read");
     if kind == "AMC" {
         let end = bytes.iter().take(AMC_BYTES).rposition(|&b| b == b'\n');
         bytes.truncate(end.map_or(0, |end| end + 1));

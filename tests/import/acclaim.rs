@@ -4,9 +4,9 @@
 use super::acclaim_reference::{asf, places};
 use super::bvh::{Place, agrees, evaluate};
 use super::damage::Damage;
-use super::data;
 use mimic::humanoid::{self, Slot};
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn text(path: &Path) -> String {
 
 #[test]
 fn every_joint_of_every_frame_follows_the_formula() {
-    let (Some(amc), Some(skeleton)) = (data("cmu/01_01.amc"), data("cmu/01.asf")) else {
+    let (Some(amc), Some(skeleton)) = (foreign("cmu/01_01.amc"), foreign("cmu/01.asf")) else {
         return;
     };
     let clip = import::load(&amc, &Options::default()).expect("it imports");
@@ -46,9 +46,9 @@ fn every_joint_of_every_frame_follows_the_formula() {
 #[test]
 fn the_same_take_as_bvh_has_the_same_places() {
     let (Some(amc), Some(skeleton), Some(bvh)) = (
-        data("cmu/01_01.amc"),
-        data("cmu/01.asf"),
-        data("cmu/01_01.bvh"),
+        foreign("cmu/01_01.amc"),
+        foreign("cmu/01.asf"),
+        foreign("cmu/01_01.bvh"),
     ) else {
         return;
     };
@@ -137,7 +137,7 @@ fn acclaim_name(bvh: &str) -> String {
 
 #[test]
 fn the_skeleton_alone_has_joints_and_no_motion() {
-    let Some(path) = data("cmu/01.asf") else {
+    let Some(path) = foreign("cmu/01.asf") else {
         return;
     };
     let look = import::inspect(&path).expect("it opens");

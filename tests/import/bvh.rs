@@ -1,8 +1,8 @@
 //! BVH files against a direct evaluation of the format, in plain matrices, and files made to be awkward.
 
-use super::data;
 use mimic::clip::Clip;
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use std::path::Path;
 
 pub(super) type Place = [f64; 3];
@@ -145,7 +145,7 @@ fn every_joint_of_every_frame_is_in_its_place() {
         ("games105/run_forward.bvh", 'y', 1.0),
         ("makehuman/mh_walk1.bvh", 'z', 0.1),
     ] {
-        let Some(path) = data(name) else { return };
+        let Some(path) = foreign(name) else { return };
         let text = std::fs::read_to_string(&path).expect("the file opens");
         let options = Options {
             trim: Some((0.0, f64::INFINITY)),
@@ -165,7 +165,7 @@ fn rates_are_those_that_the_frame_times_stand_for() {
         ("makehuman/mh_walk1.bvh", 24.0),
         ("poser-bvh/walk.bvh", 100.0 / 3.0),
     ] {
-        let Some(path) = data(name) else { return };
+        let Some(path) = foreign(name) else { return };
         let clip = import::load(&path, &Options::default()).expect("it imports");
         assert!((clip.fps - fps).abs() < 1e-9, "{name}: {}", clip.fps);
     }
@@ -174,10 +174,10 @@ fn rates_are_those_that_the_frame_times_stand_for() {
 /// The recording of subject 1 has as many frames in its own format, which has no pose before them.
 #[test]
 fn a_pose_before_the_motion_is_left_out_unless_it_is_asked_for() {
-    let Some(path) = data("cmu/01_01.bvh") else {
+    let Some(path) = foreign("cmu/01_01.bvh") else {
         return;
     };
-    let Some(recording) = data("cmu/01_01.amc") else {
+    let Some(recording) = foreign("cmu/01_01.amc") else {
         return;
     };
     let text = std::fs::read_to_string(recording).expect("the file opens");
@@ -272,7 +272,7 @@ fn figures_that_stand_along_another_axis_are_set_upright() {
         ("deepmimic/humanoid3d_getup_faceup.txt", "+Y"),
         ("mixamo/MarathonManBackflip.fbx", "+Y"),
     ] {
-        let Some(path) = data(name) else { return };
+        let Some(path) = foreign(name) else { return };
         let clip = import::load(&path, &Options::default()).expect("it imports");
         assert_eq!(clip.source.up_axis, axis, "{name}");
         let corrected = clip.problems.iter().any(|p| p.id == "up-axis-corrected");

@@ -1,8 +1,8 @@
 //! DeepMimic motions against a direct evaluation of the format's formulas, in its own axes (Y up, X forward).
 
-use super::data;
 use mimic::clip::LoopMode;
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -109,7 +109,7 @@ fn every_joint_of_every_frame_is_in_its_place() {
         "spin",
         "getup_faceup",
     ] {
-        let Some(path) = data(&format!("deepmimic/humanoid3d_{name}.txt")) else {
+        let Some(path) = foreign(&format!("deepmimic/humanoid3d_{name}.txt")) else {
             return;
         };
         let clip = import::load(&path, &Options::default()).expect("it imports");
@@ -127,7 +127,7 @@ fn every_joint_of_every_frame_is_in_its_place() {
 
 #[test]
 fn rate_loop_and_rest_are_those_of_the_file() {
-    let Some(walk) = data("deepmimic/humanoid3d_walk.txt") else {
+    let Some(walk) = foreign("deepmimic/humanoid3d_walk.txt") else {
         return;
     };
     let clip = import::load(&walk, &Options::default()).expect("it imports");
@@ -150,7 +150,7 @@ fn rate_loop_and_rest_are_those_of_the_file() {
 #[test]
 fn knees_bend_backward_and_elbows_forward() {
     for name in ["walk", "run", "kick"] {
-        let Some(path) = data(&format!("deepmimic/humanoid3d_{name}.txt")) else {
+        let Some(path) = foreign(&format!("deepmimic/humanoid3d_{name}.txt")) else {
             return;
         };
         let clip = import::load(&path, &Options::default()).expect("it imports");
@@ -187,7 +187,7 @@ fn knees_bend_backward_and_elbows_forward() {
 
 #[test]
 fn other_rates_keep_both_ends() {
-    let Some(kick) = data("deepmimic/humanoid3d_kick.txt") else {
+    let Some(kick) = foreign("deepmimic/humanoid3d_kick.txt") else {
         return;
     };
     let options = Options {
@@ -207,7 +207,7 @@ fn other_rates_keep_both_ends() {
 #[test]
 fn dogs_and_characters_are_refused_with_a_reason() {
     for (name, reason) in [("dog3d_trot.txt", "dog"), ("humanoid3d.txt", "character")] {
-        let Some(path) = data(&format!("deepmimic/{name}")) else {
+        let Some(path) = foreign(&format!("deepmimic/{name}")) else {
             return;
         };
         let error = import::load(&path, &Options::default())

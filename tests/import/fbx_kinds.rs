@@ -2,10 +2,10 @@
 //! in other forms against itself.
 
 use super::damage::Damage;
-use super::data;
 use super::fbx_rewritten::{Value, as_ascii, as_big_endian, node, records};
 use mimic::clip::Clip;
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -106,7 +106,7 @@ fn farthest(clip: &Clip, oracle: &ufbx::Scene, index: usize) -> f64 {
 
 /// Compares all takes of a file; how many frames these have.
 fn check(file: &str) -> usize {
-    let Some(at) = data(&format!("torture-fbx/{file}.fbx")) else {
+    let Some(at) = foreign(&format!("torture-fbx/{file}.fbx")) else {
         return 0;
     };
     let bytes = std::fs::read(&at).expect("the file opens");
@@ -158,7 +158,7 @@ fn files_of_meshes_alone_are_refused_for_that() {
         "maya_post_rotate_order_6100_binary",
         "synthetic_pre_post_rotate_7500_ascii",
     ] {
-        let Some(at) = data(&format!("torture-fbx/{file}.fbx")) else {
+        let Some(at) = foreign(&format!("torture-fbx/{file}.fbx")) else {
             return;
         };
         let refused = import::inspect(at).expect_err("refused").to_string();

@@ -2,9 +2,9 @@
 //!
 //! `MIMIC_WRITE_DOCS=1` writes it. Without the feature `ufbx`, some of these files are refused and the table is another.
 
-use super::data;
 use mimic::humanoid;
 use mimic::import::{self, Inspection, Options};
+use mimic_test_support::foreign;
 use std::path::{Path, PathBuf};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/formats.md");
@@ -99,7 +99,7 @@ fn table(folder: &Path) -> String {
 
 #[test]
 fn the_page_says_what_becomes_of_every_file() {
-    let Some(folder) = data("") else { return };
+    let Some(folder) = foreign("") else { return };
     let page = std::fs::read_to_string(PAGE).expect("the page");
     let (prose, written) = page.split_once(MARK).expect("the mark of the table");
     let table = table(&folder);

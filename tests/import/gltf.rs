@@ -1,9 +1,9 @@
 //! Real glTF files against an evaluation that shares no code with the importer.
 
-use super::data;
 use super::gltf_reference::Reference;
 use mimic::clip::{Clip, LoopMode};
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use nalgebra::{Matrix4, Vector3};
 use std::path::Path;
 
@@ -59,7 +59,7 @@ fn farthest(clip: &Clip, reference: &Reference, take: &str, facing: f64) -> f64 
 
 #[test]
 fn xbot_walks_as_its_file_says() {
-    let Some(path) = data("mixamo/Xbot.glb") else {
+    let Some(path) = foreign("mixamo/Xbot.glb") else {
         return;
     };
     let clip = load(&path, "Walk");
@@ -92,7 +92,7 @@ fn real_rigs_are_in_their_places() {
         ("kenney/kenney_character.glb", "walk"),
     ];
     for (name, take) in files {
-        let Some(path) = data(name) else {
+        let Some(path) = foreign(name) else {
             return;
         };
         let clip = load(&path, take);
@@ -113,7 +113,7 @@ fn real_rigs_are_in_their_places() {
 
 #[test]
 fn every_interpolation_of_every_property_is_exact() {
-    let Some(path) = data("khronos/interpolation_test.gltf") else {
+    let Some(path) = foreign("khronos/interpolation_test.gltf") else {
         return;
     };
     let reference = Reference::open(&path);
@@ -129,7 +129,7 @@ fn every_interpolation_of_every_property_is_exact() {
 
 #[test]
 fn rotations_are_the_files_own() {
-    let Some(path) = data("torture-gltf/01_cs_rotate.gltf") else {
+    let Some(path) = foreign("torture-gltf/01_cs_rotate.gltf") else {
         return;
     };
     let reference = Reference::open(&path);
@@ -173,7 +173,7 @@ fn odd_files_are_read_or_refused_with_a_reason() {
     ];
     let mut read = 0;
     for folder in folder {
-        let Some(folder) = data(folder) else {
+        let Some(folder) = foreign(folder) else {
             return;
         };
         for entry in std::fs::read_dir(folder).expect("the folder opens") {
@@ -213,7 +213,7 @@ fn odd_files_are_read_or_refused_with_a_reason() {
 
 #[test]
 fn a_take_is_found_by_name_or_number_and_unknown_ones_list_the_others() {
-    let Some(path) = data("mixamo/Xbot.glb") else {
+    let Some(path) = foreign("mixamo/Xbot.glb") else {
         return;
     };
     let look = import::inspect(&path).expect("it opens");
@@ -247,7 +247,7 @@ fn a_take_is_found_by_name_or_number_and_unknown_ones_list_the_others() {
 
 #[test]
 fn a_character_that_faces_backward_is_turned() {
-    let Some(path) = data("mixamo/Soldier.glb") else {
+    let Some(path) = foreign("mixamo/Soldier.glb") else {
         return;
     };
     let clip = load(&path, "Walk");
@@ -278,7 +278,7 @@ fn nodes_that_stand_in_a_pose_rest_as_their_skin_was_bound() {
         "quaternius/cyberpunk_Character.glb",
         "bitmoji/bitmoji_run.glb",
     ] {
-        let Some(path) = data(name) else {
+        let Some(path) = foreign(name) else {
             return;
         };
         let look = import::inspect(&path).expect("it opens");

@@ -19,15 +19,3 @@ mod gltf_reference;
 mod maps;
 mod robust;
 mod told;
-
-use std::path::{Path, PathBuf};
-
-/// A file of the collection of real clips that may lie beside the repository.
-fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(name);
-    if !path.exists() {
-        eprintln!("skipped: no {}", path.display());
-        return None;
-    }
-    Some(path)
-}

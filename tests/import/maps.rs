@@ -1,8 +1,8 @@
 //! Every humanoid rig maps by itself, as it was read off its file by hand (`maps.txt`).
 
-use crate::data;
 use mimic::humanoid::{self, Slot};
 use mimic::import;
+use mimic_test_support::foreign;
 
 /// Files that share a rig, and the names of its joints by slot.
 struct Rig {
@@ -44,7 +44,7 @@ fn every_rig_maps_by_itself() {
     let mut seen = 0;
     for rig in &rigs {
         for file in &rig.files {
-            let Some(path) = data(file) else { continue };
+            let Some(path) = foreign(file) else { continue };
             seen += 1;
             let joints = import::inspect(path).expect("it can be read").joints;
             let map = humanoid::map(&joints).unwrap_or_else(|e| panic!("{file}: {e}"));

@@ -1,8 +1,8 @@
 //! Files that were cut, overwritten or flipped never bring the importer down.
 
 use super::damage::Damage;
-use super::data;
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 
 /// Damages `bytes` many times; reading may fail but must return, and what is returned must be whole.
 fn survives(name: &str, bytes: &[u8], rounds: usize) {
@@ -53,7 +53,7 @@ fn damaged_real_files() {
         ("raylib/greenman.glb", 300),
     ];
     for (name, rounds) in files {
-        let Some(path) = data(name) else {
+        let Some(path) = foreign(name) else {
             return;
         };
         let bytes = std::fs::read(&path).expect("the file opens");

@@ -1,11 +1,11 @@
 //! Files that say which joint is which bone: VRM models of both versions, and VRM animations.
 
-use super::data;
 use super::gltf_made::base64;
 use mimic::clip::Clip;
 use mimic::clip::edit::Plane;
 use mimic::humanoid::{self, Slot};
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
@@ -56,7 +56,7 @@ fn vrm_files_map_as_they_say() {
         ("vrm/idle_loop.vrma", 21),
         ("vrm/test.vrma", 21),
     ] {
-        let Some(path) = data(file) else { return };
+        let Some(path) = foreign(file) else { return };
         let joints = import::inspect(&path).expect("it can be read").joints;
         let map = humanoid::map(&joints).unwrap_or_else(|e| panic!("{file}: {e}"));
         let told = told(&json_of(&path));

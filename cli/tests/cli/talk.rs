@@ -75,7 +75,7 @@ fn colours_are_for_terminals_without_no_color() {
     let bench = Workbench::new();
     let (Some(coloured), Some(plain)) = (at_a_terminal(&bench, ""), at_a_terminal(&bench, "1"))
     else {
-        eprintln!("skipped: there is no `script` here to play a terminal");
+        mimic_test_support::skip("no `script` program to play a terminal");
         return;
     };
     assert!(coloured.contains("\x1b[31;1merror:"), "{coloured}");

@@ -2,15 +2,12 @@
 
 use super::super::*;
 use super::{assert_maps, figure, nameless};
+use mimic_test_support::foreign;
 use nalgebra::Isometry3;
 
 /// The joints of a BVH file's hierarchy; `turn` brings its axes to X forward and Z up.
 fn bvh_joints(file: &str, turn: fn([f64; 3]) -> [f64; 3]) -> Option<Vec<Joint>> {
-    let path = format!("{}/../shared/data/{file}", env!("CARGO_MANIFEST_DIR"));
-    let Ok(text) = std::fs::read_to_string(path) else {
-        eprintln!("skipped: no test data `{file}`");
-        return None;
-    };
+    let text = std::fs::read_to_string(foreign(file)?).expect("the file can be read");
     let mut joints: Vec<Joint> = Vec::new();
     let mut open: Vec<Option<usize>> = Vec::new();
     let mut next = None;

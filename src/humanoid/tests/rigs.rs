@@ -3,21 +3,12 @@
 use super::super::*;
 use super::assert_maps;
 use crate::import;
+use mimic_test_support::foreign;
 use nalgebra::Isometry3;
-use std::path::PathBuf;
-
-fn data(file: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(file);
-    let found = path.exists().then_some(path);
-    if found.is_none() {
-        eprintln!("skipped: no test data `{file}`");
-    }
-    found
-}
 
 /// The joints that the importer finds in a glTF file.
 fn gltf_joints(file: &str) -> Option<Vec<Joint>> {
-    let look = import::inspect(data(file)?).unwrap_or_else(|e| panic!("{e}"));
+    let look = import::inspect(foreign(file)?).unwrap_or_else(|e| panic!("{e}"));
     Some(look.joints)
 }
 
@@ -139,7 +130,8 @@ fn unreal_names_map() {
 /// Joints of DeepMimic's humanoid from its character file, whose axes are Y up and X forward.
 fn deepmimic_joints() -> Option<Vec<Joint>> {
     let file: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(data("deepmimic/humanoid3d.txt")?).unwrap()).unwrap();
+        serde_json::from_slice(&std::fs::read(foreign("deepmimic/humanoid3d.txt")?).unwrap())
+            .unwrap();
     let joints = file["Skeleton"]["Joints"].as_array().unwrap();
     let number = |joint: &serde_json::Value, key: &str| joint[key].as_f64().unwrap();
     let build = |joint: &serde_json::Value| Joint {

@@ -3,11 +3,10 @@
 use super::rewritten::as_binary;
 use super::{FbxError, FbxScene, read};
 use crate::import::scene::Scene;
+use mimic_test_support::foreign;
 use nalgebra::{Matrix4, Vector3};
 use std::collections::BTreeMap;
-use std::path::Path;
 
-const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
 pub(super) const TOLERANCE_M: f64 = 1e-4;
 /// Of the farthest node's distance from the origin: ufbx keeps tangents as f32, and blending
 /// Euler angles near a pole magnifies the difference. It exceeds `TOLERANCE_M` only beyond ten metres.
@@ -103,10 +102,7 @@ fn compare(ours: &Worlds, theirs: &Worlds, unit_m: f64, place: &str) -> (f64, f6
 
 /// A file's bytes, and what they are in binary form.
 pub(super) fn bytes_of(file: &str) -> Option<(Vec<u8>, Vec<u8>)> {
-    let Ok(bytes) = std::fs::read(Path::new(DATA).join(file)) else {
-        eprintln!("skipped: {file} isn't there");
-        return None;
-    };
+    let bytes = std::fs::read(foreign(file)?).expect("the file can be read");
     let binary = match read(&bytes) {
         Err(FbxError::Ascii) => as_binary(&bytes),
         _ => bytes.clone(),

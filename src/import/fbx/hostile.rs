@@ -5,13 +5,11 @@ use crate::import::scene::Scene;
 use fbxcel::low::FbxVersion;
 use fbxcel::low::v7400::ArrayAttributeEncoding;
 use fbxcel::writer::v7400::binary::Writer;
+use mimic_test_support::foreign;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::io::Cursor;
-use std::path::Path;
 use std::time::{Duration, Instant};
-
-const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
 
 /// Reads and, where that works, samples; fails the test if it takes long.
 fn survives(bytes: &[u8]) {
@@ -60,11 +58,10 @@ fn mutations_of_synthetic_scenes_survive() {
 
 #[test]
 fn mutations_of_a_real_file_survive() {
-    let path = Path::new(DATA).join("torture-fbx/maya_anim_layers_7500_binary.fbx");
-    let Ok(original) = std::fs::read(path) else {
-        eprintln!("skipped: the file isn't there");
+    let Some(path) = foreign("torture-fbx/maya_anim_layers_7500_binary.fbx") else {
         return;
     };
+    let original = std::fs::read(path).expect("the file can be read");
     let mut random = ChaCha8Rng::seed_from_u64(8);
     for _ in 0..2000 {
         let mut bytes = original.clone();

@@ -75,9 +75,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
 fn the_gradient_is_the_derivative_of_the_cost() {
     let marathon = Skeleton::load("marathon").expect("a built-in character");
     let mut skeletons = vec![humanoid(), marathon];
-    skeletons.extend(
-        data("characters/mimickit_humanoid.xml").map(|path| Skeleton::load(&path).unwrap()),
-    );
+    skeletons.extend(foreign_skeleton("characters/mimickit_humanoid.xml"));
     let turning = Cycle {
         translation: Vector3::new(0.4, -0.2, 0.0),
         heading: 0.5,

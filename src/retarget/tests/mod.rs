@@ -9,24 +9,23 @@ use super::*;
 use crate::clip::{Joint, Margin, Source};
 use crate::humanoid::Slot;
 use crate::import;
+use mimic_test_support::foreign;
 use nalgebra::{Isometry3, UnitQuaternion};
 use std::f64::consts::FRAC_PI_2;
-
-fn data(file: &str) -> Option<String> {
-    let path = format!("{}/../shared/data/{file}", env!("CARGO_MANIFEST_DIR"));
-    let there = std::path::Path::new(&path).exists();
-    if !there {
-        eprintln!("skipped: no test data `{file}`");
-    }
-    there.then_some(path)
-}
 
 fn clip(file: &str, take: Option<&str>) -> Option<Clip> {
     let options = import::Options {
         take: take.map(str::to_owned),
         ..Default::default()
     };
-    Some(import::load(data(file)?, &options).unwrap_or_else(|e| panic!("{file}: {e}")))
+    Some(import::load(foreign(file)?, &options).unwrap_or_else(|e| panic!("{file}: {e}")))
+}
+
+/// A character by other people.
+fn foreign_skeleton(file: &str) -> Option<Skeleton> {
+    let path = foreign(file)?;
+    let path = path.to_str().expect("the path is text");
+    Some(Skeleton::load(path).unwrap_or_else(|e| panic!("{e}")))
 }
 
 fn humanoid() -> Skeleton {

@@ -1,7 +1,7 @@
 //! Clips that other people recorded.
 
 use super::super::*;
-use super::{clip, coordinate, data, humanoid, on_humanoid};
+use super::{clip, coordinate, foreign, foreign_skeleton, humanoid, on_humanoid};
 use crate::humanoid::Slot;
 use crate::import;
 use nalgebra::Isometry3;
@@ -211,10 +211,9 @@ fn a_boxer_on_his_toes_does_not_lift_the_ground() {
 
 #[test]
 fn a_skeleton_of_hinges_in_t_pose_does_as_well() {
-    let Some(path) = data("characters/mimickit_humanoid.xml") else {
+    let Some(skeleton) = foreign_skeleton("characters/mimickit_humanoid.xml") else {
         return;
     };
-    let skeleton = Skeleton::load(&path).unwrap();
     let Some(clip) = clip("deepmimic/humanoid3d_walk.txt", None) else {
         return;
     };
@@ -247,7 +246,7 @@ fn a_part_in_which_no_foot_comes_down_keeps_its_height() {
         trim: Some((1.25, 1.45)),
         ..Default::default()
     };
-    let Some(path) = data("deepmimic/humanoid3d_cartwheel.txt") else {
+    let Some(path) = foreign("deepmimic/humanoid3d_cartwheel.txt") else {
         return;
     };
     let clip = import::load(path, &options).unwrap();
@@ -266,10 +265,9 @@ fn a_part_in_which_no_foot_comes_down_keeps_its_height() {
 /// Google's MuJoCo humanoid hangs on its torso; its hips go where the source's are all the same.
 #[test]
 fn a_skeleton_rooted_at_its_torso_has_its_hips_where_the_source_has_them() {
-    let Some(path) = data("characters/mujoco_humanoid.xml") else {
+    let Some(skeleton) = foreign_skeleton("characters/mujoco_humanoid.xml") else {
         return;
     };
-    let skeleton = Skeleton::load(&path).unwrap();
     let Some(clip) = clip("deepmimic/humanoid3d_spinkick.txt", None) else {
         return;
     };

@@ -21,7 +21,7 @@ const LEFT: usize = 10;
 const SAME: f64 = 0.002;
 
 fn files() -> Vec<String> {
-    let folders = FOLDERS.iter().filter_map(|folder| data(folder));
+    let folders = FOLDERS.iter().filter_map(|folder| foreign(folder));
     let entries = folders.filter_map(|path| std::fs::read_dir(path).ok());
     let paths = entries.flatten().flatten().map(|entry| entry.path());
     let kinds = ["fbx", "glb", "bvh", "amc", "txt"];

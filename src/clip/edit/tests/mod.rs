@@ -6,8 +6,8 @@ mod travel;
 
 use crate::clip::{Clip, Error, Joint, LoopMode, Margin, Source};
 use crate::import;
+use mimic_test_support::foreign;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use std::path::PathBuf;
 
 /// One of the clips in `clips/`.
 fn ours(file: &str) -> Clip {
@@ -17,11 +17,7 @@ fn ours(file: &str) -> Clip {
 
 /// A clip that others made, if it is there.
 fn theirs(file: &str, take: Option<&str>) -> Option<Clip> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(file);
-    if !path.exists() {
-        eprintln!("skipped: no test data `{file}`");
-        return None;
-    }
+    let path = foreign(file)?;
     let options = import::Options {
         take: take.map(str::to_owned),
         ..Default::default()
