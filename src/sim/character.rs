@@ -1,6 +1,7 @@
 //! A skeleton as the simulation sees it: welded bodies are one link, and a link has one joint.
 
-use super::{LinkState, SimError};
+use super::error::SimError;
+use super::state::LinkState;
 use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton};
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;

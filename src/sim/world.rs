@@ -1,41 +1,12 @@
 //! One character on one ground.
 
 use super::articulated::{Articulated, LANES, Stepped};
+use super::character::Character;
+use super::error::Diverged;
 use super::rapier::Rapier;
-use super::{Character, Diverged, Engine, Settings};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-
-/// Where a link is and how it moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinkState {
-    /// World from link.
-    pub pose: Isometry3<f32>,
-    /// Velocity of the link frame's origin, world axes, m/s.
-    pub linear: Vector3<f32>,
-    /// World axes, rad/s.
-    pub angular: Vector3<f32>,
-}
-
-impl LinkState {
-    fn at_rest() -> Self {
-        LinkState {
-            pose: Isometry3::identity(),
-            linear: Vector3::zeros(),
-            angular: Vector3::zeros(),
-        }
-    }
-}
-
-/// Where a drive should turn its link.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
-    /// The root has no drive.
-    Free,
-    /// Joint rotation, identity at rest.
-    Ball(UnitQuaternion<f32>),
-    /// Joint angle, zero at rest, radians.
-    Hinge(f32),
-}
+use super::settings::{Engine, Settings};
+use super::state::{LinkState, Target};
+use nalgebra::Vector3;
 
 /// What moves the links.
 enum Mover {

@@ -20,8 +20,10 @@ mod step;
 mod tests;
 mod tree;
 
-use super::world::{LinkState, Target};
-use super::{Character, Diverged, Settings};
+use super::character::Character;
+use super::error::Diverged;
+use super::settings::Settings;
+use super::state::{LinkState, Target};
 use nalgebra::Vector3;
 use state::State;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! Coordinates of eight characters, and where they put them.
 
-use super::super::world::LinkState;
+use super::super::state::LinkState;
 use super::algebra::{Rotation, Turn, Vec3};
 use super::lanes::Lanes;
 use super::spatial::Motion;

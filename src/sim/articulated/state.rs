@@ -1,6 +1,6 @@
 //! What a step of one character leaves to the next.
 
-use super::super::world::{LinkState, Target};
+use super::super::state::{LinkState, Target};
 use super::tree::{Joint, Tree};
 use crate::skeleton::twist;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};

@@ -1,12 +1,14 @@
 //! A control step of up to eight characters, from top to bottom.
 
+use super::super::error::Diverged;
+use super::super::settings::Settings;
+use super::Stepped;
 use super::contact::Contacts;
 use super::dynamics::Dynamics;
 use super::ground::Ground;
 use super::lanes::{LANES, Lanes, Work, on_widest};
 use super::pose::Pose;
 use super::tree::Tree;
-use super::{Diverged, Settings, Stepped};
 use nalgebra::Vector3;
 use std::any::Any;
 use std::sync::Arc;

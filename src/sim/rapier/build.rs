@@ -1,7 +1,7 @@
 //! The rapier world of a character, as it is before its first step.
 
-use super::super::Settings;
 use super::super::character::{Character, Link, LinkJoint, x_along};
+use super::super::settings::Settings;
 use super::convert;
 use crate::skeleton::{Drive, Shape};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};

@@ -10,8 +10,9 @@ mod build;
 mod convert;
 
 use super::character::Character;
-use super::world::{LinkState, Target};
-use super::{Diverged, Settings};
+use super::error::Diverged;
+use super::settings::Settings;
+use super::state::{LinkState, Target};
 use crate::skeleton::GRAVITY;
 use build::{Built, Scene};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};

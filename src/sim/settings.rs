@@ -1,0 +1,55 @@
+//! What physics is set to: which engine, at which rates.
+
+use serde::{Deserialize, Serialize};
+
+/// The engine that moves a character.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Engine {
+    /// Our own engine: reduced coordinates, drives that are stable at any stiffness.
+    #[default]
+    Articulated,
+    /// rapier3d with impulse joints: maximal coordinates.
+    Rapier,
+}
+
+/// Rates and solver settings of the physics.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Control steps per second, Hz: how often the policy acts. Default 30.
+    pub control_hz: f64,
+    /// Physics steps per control step. Default 2.
+    pub steps_per_control: u32,
+    /// Substeps per physics step, each of which integrates joints, drives and contacts. Default 4.
+    pub substeps: u32,
+    /// Time constant with which the ground gives way under a contact, seconds, as in MuJoCo's `solref`, whose default is
+    /// 0.02. Default 0: the ground is hard. The rapier engine ignores it and uses its own contact model.
+    pub contact_s: f64,
+    /// The engine that moves the character. Default `articulated`.
+    pub engine: Engine,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            control_hz: 30.0,
+            steps_per_control: 2,
+            substeps: 4,
+            contact_s: 0.0,
+            engine: Engine::Articulated,
+        }
+    }
+}
+
+impl Settings {
+    /// Duration of one control step, seconds.
+    pub fn control_dt(&self) -> f64 {
+        1.0 / self.control_hz
+    }
+
+    /// Rate at which joints, drives and contacts are integrated, Hz.
+    pub fn physics_hz(&self) -> f64 {
+        self.control_hz * f64::from(self.steps_per_control * self.substeps)
+    }
+}
