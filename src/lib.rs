@@ -1,12 +1,30 @@
 //! `mimic` takes an animation clip to a physics character that performs it.
 //!
-//! The rooms stand in the order in which data walks through them:
-//! [`import`] reads bytes into a [`clip`], [`retarget`] carries the clip onto a [`skeleton`] and makes a
-//! [`motion`], [`sim`] moves the skeleton under physics, [`task`] says what is learned and [`learn`] how,
-//! [`evaluate`] measures the result.
+//! There is a module for each stage that data goes through: [`import`] reads a file into a [`clip`]; [`retarget`] carries
+//! the clip onto the character of a [`skeleton`] and makes a [`motion`]; [`sim`] moves the character under physics;
+//! [`task`] defines what a policy has to learn and [`learn`] how it learns; [`evaluate`] measures the result.
 //!
 //! Conventions, everywhere: right-handed, Z up, X forward, Y left; metres, kilograms, seconds, radians;
 //! quaternions scalar first in files; a transform named `a_from_b` maps coordinates in `b` to coordinates in `a`.
+//!
+//! # From a clip to a motion
+//!
+//! ```
+//! use mimic::skeleton::Skeleton;
+//! use mimic::{import, retarget};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let clip = import::load("clips/walk.glb", &import::Options::default())?;
+//! let skeleton = Skeleton::load("humanoid")?;
+//! let retargeted = retarget::retarget(&clip, &skeleton, &retarget::Options::default())?;
+//!
+//! // Joint positions of the character, on average within some centimetres of the clip's.
+//! assert!(retargeted.report.keypoint_error_m.mean < 0.05);
+//! // Coordinates in MuJoCo's order, for every frame: 7 of the root, then those of the joints.
+//! assert!(retargeted.motion.qpos.iter().all(|frame| frame.len() == skeleton.nq));
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod clip;
 pub mod evaluate;
@@ -20,3 +38,7 @@ pub mod retarget;
 pub mod sim;
 pub mod skeleton;
 pub mod task;
+
+/// The linear algebra that the interface of this crate speaks: vectors, rotations, rigid transforms. Use this instead of
+/// a dependency of your own, which may be of another version and then has other types.
+pub use nalgebra;
