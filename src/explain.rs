@@ -71,20 +71,36 @@ pub enum Parameter {
     Output,
 }
 
+/// Most characters that a part keeps of its start, and as many of its end.
+const KEPT: usize = 300;
+
+/// A text on one line of bearable length. Names that a file holds find their way into messages: control characters in
+/// them could write to a terminal, and nobody reads a name of a megabyte. A long text loses its middle, because the start
+/// says what is wrong and the end often where.
+pub(crate) fn one_line(text: &str) -> String {
+    let plain = |c: char| if c.is_control() { ' ' } else { c };
+    let letters: Vec<char> = text.trim().chars().map(plain).collect();
+    if letters.len() <= 2 * KEPT {
+        return letters.into_iter().collect();
+    }
+    let (start, end) = (&letters[..KEPT], &letters[letters.len() - KEPT..]);
+    start.iter().chain(&['…']).chain(end).collect()
+}
+
 impl Explanation {
     /// What a caller did wrong.
-    pub fn input(cause: impl Into<String>) -> Self {
+    pub fn input(cause: impl AsRef<str>) -> Self {
         Self {
             fault: Fault::Input,
             file: None,
             place: None,
-            cause: cause.into(),
+            cause: one_line(cause.as_ref()),
             remedy: None,
         }
     }
 
     /// What failed although everything was right.
-    pub fn work(cause: impl Into<String>) -> Self {
+    pub fn work(cause: impl AsRef<str>) -> Self {
         Self {
             fault: Fault::Work,
             ..Self::input(cause)
@@ -100,16 +116,16 @@ impl Explanation {
 
     /// Says where in the file.
     #[must_use]
-    pub fn place(mut self, place: impl Into<String>) -> Self {
-        self.place = Some(place.into());
+    pub fn place(mut self, place: impl AsRef<str>) -> Self {
+        self.place = Some(one_line(place.as_ref()));
         self
     }
 
     /// Says what to do; `advice` begins with a verb.
     #[must_use]
-    pub fn remedy(mut self, advice: impl Into<String>) -> Self {
+    pub fn remedy(mut self, advice: impl AsRef<str>) -> Self {
         self.remedy = Some(Remedy {
-            advice: advice.into(),
+            advice: one_line(advice.as_ref()),
             parameter: None,
         });
         self
@@ -117,9 +133,9 @@ impl Explanation {
 
     /// Says what to do, and which parameter to change for that.
     #[must_use]
-    pub fn remedy_by(mut self, parameter: Parameter, advice: impl Into<String>) -> Self {
+    pub fn remedy_by(mut self, parameter: Parameter, advice: impl AsRef<str>) -> Self {
         self.remedy = Some(Remedy {
-            advice: advice.into(),
+            advice: one_line(advice.as_ref()),
             parameter: Some(parameter),
         });
         self
@@ -170,6 +186,24 @@ mod tests {
         assert_eq!(
             whole.to_string(),
             "`kick.fbx`: take `Kick`: it is empty; choose another take"
+        );
+    }
+
+    #[test]
+    fn messages_are_one_line_of_bearable_length() {
+        let message = |name: &str| {
+            let take = Explanation::input("it is broken").place(format!("take `{name}`"));
+            take.remedy("export it again").to_string()
+        };
+        assert_eq!(
+            message("a\r\nb\u{1b}[2J"),
+            "take `a  b [2J`: it is broken; export it again"
+        );
+        let long = message(&"ö".repeat(100_000));
+        assert!(long.chars().count() < 1000, "{long}");
+        assert!(
+            long.ends_with("ö`: it is broken; export it again"),
+            "{long}"
         );
     }
 }

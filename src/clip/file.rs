@@ -50,7 +50,7 @@ impl Clip {
     /// Writes the clip file `path`, or leaves what was there untouched.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
-        let io = |source| Error::Io {
+        let io = |source| Error::Write {
             path: path.to_owned(),
             source,
         };
@@ -61,7 +61,7 @@ impl Clip {
     /// Reads the clip file `path`.
     pub fn load(path: impl AsRef<Path>) -> Result<Clip, Error> {
         let path = path.as_ref();
-        let io = |source| Error::Io {
+        let io = |source| Error::Read {
             path: path.to_owned(),
             source,
         };

@@ -5,6 +5,7 @@ pub mod edit;
 mod error;
 mod file;
 mod margin;
+mod problem;
 mod sampling;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,7 @@ pub(crate) use carry::carry;
 pub use error::Error;
 pub(crate) use file::stored_rotation;
 pub use margin::Margin;
+pub use problem::{Problem, Severity};
 pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
 
 use nalgebra::Isometry3;
@@ -38,24 +40,6 @@ pub enum LoopMode {
     Wrap,
     /// It is performed once, and then ends.
     Clamp,
-}
-
-/// How much a problem matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    Note,
-    Warning,
-    Error,
-}
-
-/// Something found in a file that its owner should know.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Problem {
-    /// Stable identifier in kebab-case, e.g. `turned-to-forward`.
-    pub id: String,
-    pub severity: Severity,
-    pub message: String,
 }
 
 /// Where a clip comes from.

@@ -1,39 +1,8 @@
 //! The joint map as a file that people edit: a JSON object from slot to joint name.
 
-use super::{HumanoidMap, Slot};
+use super::{Error, HumanoidMap, Slot};
 use crate::clip::Joint;
 use std::collections::BTreeMap;
-
-/// Why a map file can't be used.
-#[derive(Debug, thiserror::Error)]
-pub enum MapFileError {
-    #[error("the joint map is no JSON object from slot to joint name: {0}")]
-    Json(#[from] serde_json::Error),
-    #[error("the joint map names an unknown slot `{slot}`; slots are {known}")]
-    UnknownSlot { slot: String, known: String },
-    #[error("the joint map puts `{joint}` in slot `{slot}`, but the clip has no such joint{near}")]
-    UnknownJoint {
-        slot: Slot,
-        joint: String,
-        near: String,
-    },
-    #[error(
-        "the joint map puts `{joint}` in slot `{slot}`, but {count} joints of the clip have that name"
-    )]
-    AmbiguousJoint {
-        slot: Slot,
-        joint: String,
-        count: usize,
-    },
-    #[error("the joint map puts `{joint}` in both `{first}` and `{second}`")]
-    UsedTwice {
-        joint: String,
-        first: Slot,
-        second: Slot,
-    },
-    #[error("the joint map leaves `{slot}` empty, which a humanoid needs")]
-    Missing { slot: Slot },
-}
 
 impl HumanoidMap {
     /// The map as JSON text: slot to joint name, in the order of the slots.
@@ -53,9 +22,12 @@ impl HumanoidMap {
     /// Reads what [`HumanoidMap::to_json`] wrote, perhaps edited. Slots that are left out, empty or `null` stay empty.
     ///
     /// # Errors
-    /// [`MapFileError`] names the slot or joint that doesn't fit.
-    pub fn from_json(text: &str, joints: &[Joint]) -> Result<HumanoidMap, MapFileError> {
-        let named: BTreeMap<String, Option<String>> = serde_json::from_str(text)?;
+    /// [`Error`] names the slot or joint that doesn't fit.
+    pub fn from_json(text: &str, joints: &[Joint]) -> Result<HumanoidMap, Error> {
+        let named: BTreeMap<String, Option<String>> =
+            serde_json::from_str(text).map_err(|e| Error::MapSyntax {
+                reason: e.to_string(),
+            })?;
         let mut map = HumanoidMap::default();
         for (slot, joint) in named {
             let slot = slot_named(&slot)?;
@@ -65,7 +37,7 @@ impl HumanoidMap {
             let index = joint_named(slot, &joint, joints)?;
             if let Some((first, _)) = map.matches.iter().find(|(_, m)| m.joint == index) {
                 let (first, second) = (*first, slot);
-                return Err(MapFileError::UsedTwice {
+                return Err(Error::UsedTwice {
                     joint,
                     first,
                     second,
@@ -77,7 +49,7 @@ impl HumanoidMap {
             .into_iter()
             .find(|slot| map.joint(*slot).is_none())
         {
-            Some(slot) => Err(MapFileError::Missing { slot }),
+            Some(slot) => Err(Error::EmptySlot { slot }),
             None => Ok(map),
         }
     }
@@ -87,26 +59,24 @@ fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-fn slot_named(name: &str) -> Result<Slot, MapFileError> {
-    let known = || Slot::ALL.map(Slot::name).join(", ");
+fn slot_named(name: &str) -> Result<Slot, Error> {
     let slot = Slot::ALL.into_iter().find(|slot| slot.name() == name);
-    slot.ok_or_else(|| MapFileError::UnknownSlot {
+    slot.ok_or_else(|| Error::UnknownSlot {
         slot: name.to_owned(),
-        known: known(),
     })
 }
 
-fn joint_named(slot: Slot, name: &str, joints: &[Joint]) -> Result<usize, MapFileError> {
+fn joint_named(slot: Slot, name: &str, joints: &[Joint]) -> Result<usize, Error> {
     let same = |j: &usize| joints[*j].name == name;
     let found: Vec<usize> = (0..joints.len()).filter(same).collect();
     match found[..] {
         [one] => Ok(one),
-        [] => Err(MapFileError::UnknownJoint {
+        [] => Err(Error::UnknownJoint {
             slot,
             joint: name.to_owned(),
-            near: near(name, joints),
+            similar: similar(name, joints),
         }),
-        _ => Err(MapFileError::AmbiguousJoint {
+        _ => Err(Error::AmbiguousJoint {
             slot,
             joint: name.to_owned(),
             count: found.len(),
@@ -114,22 +84,13 @@ fn joint_named(slot: Slot, name: &str, joints: &[Joint]) -> Result<usize, MapFil
     }
 }
 
-/// A hint at joints that the writer may have meant.
-fn near(name: &str, joints: &[Joint]) -> String {
+/// Names of at most three joints that `name` may mean: those that contain it or that it contains, in any letter case.
+fn similar(name: &str, joints: &[Joint]) -> Vec<String> {
     let wanted = name.to_lowercase();
     let close = |joint: &&Joint| {
         let have = joint.name.to_lowercase();
         !have.is_empty() && (have.contains(&wanted) || wanted.contains(&have))
     };
-    let names: Vec<&str> = joints
-        .iter()
-        .filter(close)
-        .take(3)
-        .map(|j| j.name.as_str())
-        .collect();
-    if names.is_empty() {
-        String::new()
-    } else {
-        format!("; did you mean `{}`?", names.join("`, `"))
-    }
+    let similar = joints.iter().filter(close).take(3);
+    similar.map(|joint| joint.name.clone()).collect()
 }

@@ -3,6 +3,7 @@
 //! What the file itself tells goes before all. Limbs are found by their names where these are telling, else by the shape
 //! of the rest pose; the trunk follows from the tree: hips are where the legs meet, the chest where the arms meet.
 
+mod error;
 mod file;
 mod limbs;
 mod names;
@@ -17,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 
-pub use file::MapFileError;
+pub use error::Error;
 pub use sides::pairs;
 
 /// A place in the canonical humanoid. Serialised in kebab-case, e.g. `left-upper-leg`.
@@ -161,27 +162,6 @@ impl HumanoidMap {
     }
 }
 
-/// Why a figure is taken for no humanoid.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum NotHumanoid {
-    #[error("{joints} joints are too few for a humanoid, which needs at least {}", Slot::REQUIRED.len())]
-    TooFewJoints { joints: usize },
-    #[error(
-        "no joint found for {}; name them in a map file to use this figure as a humanoid",
-        list(missing)
-    )]
-    Missing { missing: Vec<Slot> },
-    #[error(
-        "the trunk stands at {degrees:.0}° to the legs and the arms point the way the legs do, as in a four-legged animal"
-    )]
-    Quadruped { degrees: f64 },
-}
-
-fn list(slots: &[Slot]) -> String {
-    let names: Vec<&str> = slots.iter().map(|slot| slot.name()).collect();
-    names.join(", ")
-}
-
 /// The slots whose joints can be found in any joint tree, few or none in one that is no humanoid: where to begin a map
 /// by hand.
 pub fn partial(joints: &[Joint]) -> HumanoidMap {
@@ -209,20 +189,20 @@ fn guesses(tree: &tree::Tree, joints: &[Joint]) -> HumanoidMap {
 /// shape of the rest pose.
 ///
 /// # Errors
-/// [`NotHumanoid`] when a required slot stays empty or the figure stands on four legs.
-pub fn map(joints: &[Joint]) -> Result<HumanoidMap, NotHumanoid> {
+/// [`Error`] when a required slot stays empty or the figure stands on four legs.
+pub fn map(joints: &[Joint]) -> Result<HumanoidMap, Error> {
     if joints.len() < Slot::REQUIRED.len() {
-        return Err(NotHumanoid::TooFewJoints {
+        return Err(Error::TooFewJoints {
             joints: joints.len(),
         });
     }
     let found = partial(joints);
-    let missing: Vec<Slot> = Slot::REQUIRED
+    let slots: Vec<Slot> = Slot::REQUIRED
         .into_iter()
         .filter(|slot| found.joint(*slot).is_none())
         .collect();
-    if !missing.is_empty() {
-        return Err(NotHumanoid::Missing { missing });
+    if !slots.is_empty() {
+        return Err(Error::Missing { slots });
     }
     shape::refuse_quadruped(&tree::Tree::new(joints), &found)?;
     Ok(found)

@@ -2,7 +2,7 @@
 
 use super::names::{Label, Side};
 use super::tree::Tree;
-use super::{HumanoidMap, NotHumanoid, Slot};
+use super::{Error, HumanoidMap, Slot};
 use nalgebra::Vector3;
 
 /// Confidence in a joint that only the shape speaks for.
@@ -353,7 +353,7 @@ fn arm_joints(tree: &Tree, branch: &Branch, inside: bool) -> [Option<usize>; 4] 
 }
 
 /// Refuses a figure whose trunk doesn't continue its legs and whose arms stand as legs do.
-pub(super) fn refuse_quadruped(tree: &Tree, found: &HumanoidMap) -> Result<(), NotHumanoid> {
+pub(super) fn refuse_quadruped(tree: &Tree, found: &HumanoidMap) -> Result<(), Error> {
     let span = |from: Slot, to: Slot| match (found.joint(from), found.joint(to)) {
         (Some(a), Some(b)) => tree.span(a, b),
         _ => Vector3::zeros(),
@@ -374,7 +374,7 @@ pub(super) fn refuse_quadruped(tree: &Tree, found: &HumanoidMap) -> Result<(), N
         + arm(Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand);
     let degrees = trunk.angle(&legs).to_degrees();
     if degrees < 125.0 && arms.angle(&legs) < 1.0 {
-        return Err(NotHumanoid::Quadruped { degrees });
+        return Err(Error::Quadruped { degrees });
     }
     Ok(())
 }

@@ -5,7 +5,7 @@
 
 use super::rigid::rotation_of;
 use super::scene::Node;
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use nalgebra::{Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 /// Nodes within this angle of their bind pose stand in it, in radians.
@@ -55,12 +55,10 @@ pub(crate) fn pose(
 }
 
 fn note() -> Problem {
-    Problem {
-        id: "rest-from-bind-pose".to_owned(),
-        severity: Severity::Note,
-        message: "the nodes stand in a pose of their own; the mesh's bind pose is taken as rest"
-            .to_owned(),
-    }
+    Problem::note(
+        "rest-from-bind-pose",
+        "the nodes were saved in some pose of the motion; the mesh's bind pose is used as the rest pose",
+    )
 }
 
 /// World matrices with the `bound` transforms in their parents; where none is at or above a node, its own.

@@ -1,54 +1,55 @@
 //! A scene's take becomes joints and frames in canonical space.
 
+use super::axes::UpAxis;
+use super::error::ErrorKind;
 use super::facing;
 use super::rigid::{Frame, locals};
 use super::scene::Scene;
+use super::tree;
 use super::upright::{self, Stature};
-use super::{Error, UpAxis, tree};
-use crate::clip::{Joint, Problem, Severity};
+use crate::clip::{Joint, Problem};
 use nalgebra::{Isometry3, UnitQuaternion};
 
-/// A rest pose this much smaller than the first frame's, as a part of it, has collapsed.
+/// A rest pose is unusable where it is smaller than this fraction of the first frame's pose. Chosen: in such
+/// files all joints are in one place, but for rounding.
 const COLLAPSED: f64 = 0.01;
 
-/// Times within a take at which it is looked at which way the figure stands.
+/// How many poses of a take tell which way the figure stands, ends included. Chosen: most of a motion must be upright,
+/// not most frames of it.
 const LOOKS: usize = 9;
 
 /// The joints of a scene, and how its world matrices become theirs.
 pub(crate) struct Rig<'a> {
-    file: &'a str,
     scene: &'a dyn Scene,
     frame: Frame,
-    /// Node of every joint.
+    /// Index of every joint's node.
     nodes: Vec<usize>,
     parents: Vec<Option<usize>>,
+    /// The joints at rest, in canonical space.
     pub joints: Vec<Joint>,
-    /// Up axis that the figure has, where the file states another.
+    /// Up axis that the figure has, where the file states another one.
     pub other_up: Option<UpAxis>,
+    /// What was found about the joints.
     pub problems: Vec<Problem>,
 }
 
 impl<'a> Rig<'a> {
-    /// Chooses the joints and brings their rest pose to canonical space, facing +X.
+    /// Chooses the joints and brings their rest pose to canonical space (metres, Z up), facing +X.
     ///
-    /// `first` is the take and time whose pose stands in for a rest pose that can't be used.
+    /// `first` is a take and a time in it, seconds. Its pose replaces a rest pose that can't be used.
     pub fn new(
         scene: &'a dyn Scene,
-        file: &'a str,
         frame: Frame,
         first: Option<(usize, f64)>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ErrorKind> {
         let nodes = tree::joints(scene);
         if nodes.is_empty() {
-            return Err(Error::NoJoints {
-                file: file.to_owned(),
-            });
+            return Err(ErrorKind::NoJoints);
         }
         let parents = parents(scene, &nodes);
         let left_out = first.and_then(|(take, _)| tree::left_out(scene, &nodes, take));
         let (joints, problems) = (Vec::new(), Vec::from_iter(left_out));
         let mut rig = Self {
-            file,
             scene,
             frame,
             nodes,
@@ -66,13 +67,13 @@ impl<'a> Rig<'a> {
         Ok(rig)
     }
 
-    /// World transforms of the joints at `at` (take and seconds; `None` at rest). `before` supplies the rotation
-    /// of joints that are scaled to nothing at that time.
+    /// World transforms of the joints in canonical space, at a take and its seconds, or at rest without `at`. A joint that
+    /// is scaled to nothing has no rotation: it keeps that of the frame `before`, or takes its parent's.
     pub fn world(
         &self,
         at: Option<(usize, f64)>,
         before: Option<&[Isometry3<f64>]>,
-    ) -> Result<Vec<Isometry3<f64>>, Error> {
+    ) -> Result<Vec<Isometry3<f64>>, ErrorKind> {
         let matrices = self.scene.world(at);
         let mut world: Vec<Isometry3<f64>> = Vec::with_capacity(self.nodes.len());
         for (j, &node) in self.nodes.iter().enumerate() {
@@ -89,8 +90,12 @@ impl<'a> Rig<'a> {
         Ok(world)
     }
 
-    /// World transforms at these seconds of `take`, one after the other.
-    pub fn frames(&self, take: usize, times: &[f64]) -> Result<Vec<Vec<Isometry3<f64>>>, Error> {
+    /// World transforms at these seconds of `take`, in order.
+    pub fn frames(
+        &self,
+        take: usize,
+        times: &[f64],
+    ) -> Result<Vec<Vec<Isometry3<f64>>>, ErrorKind> {
         let mut frames: Vec<Vec<Isometry3<f64>>> = Vec::with_capacity(times.len());
         for &time in times {
             let at = Some((take, time));
@@ -106,22 +111,24 @@ impl<'a> Rig<'a> {
     }
 
     /// The time to read the rest pose at: `None`, the file's own, unless its joints all stand in one place.
-    fn usable_rest(&mut self, first: Option<(usize, f64)>) -> Result<Option<(usize, f64)>, Error> {
+    fn usable_rest(
+        &mut self,
+        first: Option<(usize, f64)>,
+    ) -> Result<Option<(usize, f64)>, ErrorKind> {
         let Some(first) = first else { return Ok(None) };
         let rest = self.world(None, None).map_or(0.0, |rest| span(&rest));
         if self.nodes.len() < 2 || rest > COLLAPSED * span(&self.world(Some(first), None)?) {
             return Ok(None);
         }
-        self.problems.push(Problem {
-            id: "rest-pose-collapsed".to_owned(),
-            severity: Severity::Warning,
-            message: "the file's rest pose has all joints in one place; the first frame stands in"
-                .to_owned(),
-        });
+        self.problems.push(Problem::warning(
+            "rest-pose-collapsed",
+            "the file's rest pose has all joints in one place; the first frame is used as the rest pose",
+        ));
         Ok(Some(first))
     }
 
-    fn rest_joints(&self, rest: Option<(usize, f64)>) -> Result<Vec<Joint>, Error> {
+    /// The joints with their local transforms in the pose at `rest`.
+    fn rest_joints(&self, rest: Option<(usize, f64)>) -> Result<Vec<Joint>, ErrorKind> {
         let locals = self.locals(&self.world(rest, None)?);
         let joint = |(j, rest): (usize, Isometry3<f64>)| {
             let node = &self.scene.nodes()[self.nodes[j]];
@@ -135,8 +142,12 @@ impl<'a> Rig<'a> {
         Ok(locals.into_iter().enumerate().map(joint).collect())
     }
 
-    /// Takes the figure's own up axis where the file's is wrong.
-    fn stand_up(&mut self, rest: Option<(usize, f64)>, take: Option<usize>) -> Result<(), Error> {
+    /// Uses the figure's own up axis where the file's is wrong.
+    fn stand_up(
+        &mut self,
+        rest: Option<(usize, f64)>,
+        take: Option<usize>,
+    ) -> Result<(), ErrorKind> {
         let (Some(take), Some(stature)) = (take, Stature::of(&self.joints)) else {
             return Ok(());
         };
@@ -156,7 +167,8 @@ impl<'a> Rig<'a> {
         Ok(())
     }
 
-    fn face_forward(&mut self, rest: Option<(usize, f64)>) -> Result<(), Error> {
+    /// Turns the figure about the up axis until its rest pose faces +X.
+    fn face_forward(&mut self, rest: Option<(usize, f64)>) -> Result<(), ErrorKind> {
         let turn = facing::turn_to_forward(&facing::pairs(&self.joints, &self.world(rest, None)?))
             .unwrap_or(0.0);
         if turn == 0.0 {
@@ -164,31 +176,21 @@ impl<'a> Rig<'a> {
         }
         self.frame.axes = facing::about_z(turn) * self.frame.axes;
         self.joints = self.rest_joints(rest)?;
-        self.problems.push(Problem {
-            id: "turned-to-forward".to_owned(),
-            severity: Severity::Note,
-            message: format!(
+        self.problems.push(Problem::note(
+            "turned-to-forward",
+            format!(
                 "turned {:.0}° about the up axis to face forward",
                 turn.to_degrees()
             ),
-        });
+        ));
         Ok(())
     }
 
-    fn not_finite(&self, node: usize, at: Option<(usize, f64)>) -> Error {
-        let place = match at {
-            Some((_, time)) => format!("at {time:.3} s"),
-            None => "at rest".to_owned(),
-        };
-        let joint = self
-            .scene
-            .nodes()
-            .get(node)
-            .map_or_else(String::new, |node| node.name.clone());
-        Error::NotFinite {
-            file: self.file.to_owned(),
-            joint,
-            place,
+    fn not_finite(&self, node: usize, at: Option<(usize, f64)>) -> ErrorKind {
+        let about = self.scene.nodes().get(node);
+        ErrorKind::NotFinite {
+            joint: about.map_or_else(String::new, |node| node.name.clone()),
+            time: at.map(|(_, time)| time),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one fixed humanoid.
 
 use super::scene::{Contents, Node, Scene, Take, composed};
-use crate::clip::{MOST_FPS, Problem, Severity, slerp};
+use crate::clip::{MOST_FPS, Problem, slerp};
+use crate::explain::{Explain, Explanation, explained};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
 /// Numbers in one frame: duration, root position, root rotation, then the joints in the order of [`JOINTS`].
@@ -70,25 +71,54 @@ const JOINTS: [Definition; 15] = [
     joint("left_wrist", 13, Kind::Fixed, [0.0, -0.258947, 0.0]),
 ];
 
-/// Why a DeepMimic file couldn't be read.
-#[derive(Debug, thiserror::Error)]
-pub enum DeepMimicError {
-    #[error("broken JSON ({0}); write the file again")]
-    Json(serde_json::Error),
-    #[error("no frames; write the file again")]
+/// Why a DeepMimic file couldn't be read. Frames are counted from 0.
+#[derive(Debug)]
+pub(crate) enum DeepMimicError {
+    /// Not JSON, or not of the format's fields.
+    Json { reason: String },
+    /// A file without motion.
     NoFrames,
-    #[error("frames of 84 numbers are a DeepMimic dog; only its humanoid (44 numbers) can be read")]
+    /// A motion of the format's quadruped.
     Dog,
-    #[error(
-        "frame {frame} has {found} numbers where a DeepMimic humanoid has 44; write the file again"
-    )]
+    /// A frame that doesn't fit the humanoid.
     Width { frame: usize, found: usize },
-    #[error("frame {frame} lasts {seconds} s; durations must be positive numbers")]
+    /// A frame that doesn't last a positive time.
     Duration { frame: usize, seconds: f64 },
-    #[error("frame {frame}, joint `{joint}`: the rotation is zero; repair the file")]
+    /// A quaternion of length zero.
     ZeroRotation { frame: usize, joint: &'static str },
-    #[error("frame {frame} holds a number too large to use; repair the file")]
+    /// A number too large to compute with.
     Magnitude { frame: usize },
+}
+
+explained!(DeepMimicError);
+
+impl Explain for DeepMimicError {
+    fn explain(&self) -> Explanation {
+        let wrong = |cause: String| Explanation::input(cause).remedy("write the file again");
+        let at = |frame, cause: String| wrong(cause).place(format!("frame {frame}"));
+        match self {
+            Self::Json { reason } => wrong(format!("broken JSON ({reason})")),
+            Self::NoFrames => wrong("no frames".to_owned()),
+            Self::Dog => Explanation::input(format!(
+                "its frames of {DOG_ROW} numbers are a DeepMimic dog's"
+            ))
+            .remedy(format!(
+                "give a motion of the DeepMimic humanoid, with frames of {ROW} numbers"
+            )),
+            Self::Width { frame, found } => at(
+                frame,
+                format!("it has {found} numbers where a DeepMimic humanoid has {ROW}"),
+            ),
+            Self::Duration { frame, seconds } => at(frame, format!("it lasts {seconds} s"))
+                .remedy("make its duration a positive number"),
+            Self::ZeroRotation { frame, joint } => at(frame, "its rotation is zero".to_owned())
+                .place(format!("frame {frame}, joint `{joint}`"))
+                .remedy("repair the file"),
+            Self::Magnitude { frame } => {
+                at(frame, "it holds a number too large to use".to_owned()).remedy("repair the file")
+            }
+        }
+    }
 }
 
 /// One frame: the root's place and every joint's rotation in its parent.
@@ -115,7 +145,9 @@ pub(crate) struct DeepMimicScene {
 /// Reads a motion file. `name` becomes the take's name, since the format has none.
 pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimicError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let file: File = serde_json::from_slice(bytes).map_err(DeepMimicError::Json)?;
+    let file: File = serde_json::from_slice(bytes).map_err(|e| DeepMimicError::Json {
+        reason: e.to_string(),
+    })?;
     let poses = poses(&file.frames)?;
     let mut problems = Vec::new();
     let wraps = loop_word(file.loops.as_deref(), &mut problems);
@@ -149,13 +181,10 @@ fn loop_word(word: Option<&str>, problems: &mut Vec<Problem>) -> Option<bool> {
         Some("wrap") => Some(true),
         Some("none") => Some(false),
         Some(other) => {
-            problems.push(Problem {
-                id: "unknown-loop-word".to_owned(),
-                severity: Severity::Warning,
-                message: format!(
-                    "`Loop` is `{other}`, neither wrap nor none; the motion itself decides"
-                ),
-            });
+            problems.push(Problem::warning(
+                "unknown-loop-word",
+                format!("`Loop` is `{other}`, neither wrap nor none: whether it repeats was read off the motion"),
+            ));
             None
         }
         None => None,

@@ -1,6 +1,7 @@
 //! What kind of file some bytes are, by their content.
 
 use super::fbx::is_ascii as is_ascii_fbx;
+use crate::explain::Explanation;
 use safetensors::SafeTensors;
 
 /// A format that can be read.
@@ -15,11 +16,11 @@ pub(crate) enum Format {
     Amc,
 }
 
-/// How far into a text the words that tell its kind are looked for, in bytes.
+/// How many bytes of a text are searched for the words that tell its kind. Chosen: files begin with comments.
 const HEAD: usize = 4096;
 
-/// The format of `bytes`, or what they seem to be and what to do about it.
-pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
+/// The format of `bytes`, or what they seem to be instead and what to do about it.
+pub(crate) fn detect(bytes: &[u8]) -> Result<Format, Explanation> {
     if let Some(format) = own_format(bytes) {
         return Err(own_refusal(&format));
     }
@@ -42,7 +43,7 @@ pub(crate) fn detect(bytes: &[u8]) -> Result<Format, String> {
     acclaim(text).ok_or_else(|| refusal(text))
 }
 
-/// Which of Acclaim's two texts this is, by a section that each must have.
+/// Which of Acclaim's two texts this is, by sections that only one of them has.
 fn acclaim(text: &[u8]) -> Option<Format> {
     if !text.starts_with(b"#") && !text.starts_with(b":") {
         return None;
@@ -62,13 +63,13 @@ fn acclaim(text: &[u8]) -> Option<Format> {
     }
 }
 
-/// What one of our own files says to be.
+/// The kind of one of our own files, as its metadata states it.
 fn own_format(bytes: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Stamp {
         format: String,
     }
-    // Eight bytes of length, then a JSON object: before that is sure, nothing is parsed.
+    // A safetensors file begins with eight bytes of length and a JSON object. Nothing is parsed unless that brace is there.
     if bytes.get(8) != Some(&b'{') {
         return None;
     }
@@ -77,17 +78,20 @@ fn own_format(bytes: &[u8]) -> Option<String> {
     Some(serde_json::from_str::<Stamp>(text).ok()?.format)
 }
 
-fn own_refusal(format: &str) -> String {
+fn own_refusal(format: &str) -> Explanation {
     let remedy = match format {
-        "clip" => "name it NAME.clip, and give it to `mimic info` or `mimic retarget`",
-        "motion" => "give it to `mimic tracks` or `mimic replay`",
-        "policy" | "checkpoint" => "give the folder of its run to `mimic eval` or `mimic replay`",
+        "clip" => "rename it to end in `.clip`, and use it as a clip",
+        "motion" => "rename it to end in `.motion`, and use it as a motion",
+        "policy" | "checkpoint" => "give the folder of its training run where a run is wanted",
         _ => "give an animation file",
     };
-    format!("is a {format} of mimic's own, not an animation file; {remedy}")
+    Explanation::input(format!(
+        "a {format} that mimic wrote, not an animation file"
+    ))
+    .remedy(remedy)
 }
 
-fn detect_json(text: &[u8]) -> Result<Format, String> {
+fn detect_json(text: &[u8]) -> Result<Format, Explanation> {
     #[derive(serde::Deserialize)]
     struct Keys {
         asset: Option<serde::de::IgnoredAny>,
@@ -100,31 +104,34 @@ fn detect_json(text: &[u8]) -> Result<Format, String> {
         Ok(keys) if keys.asset.is_some() => Ok(Format::Gltf),
         Ok(keys) if keys.frames.is_some() => Ok(Format::DeepMimic),
         Ok(keys) if keys.skeleton.is_some() => {
-            Err("a DeepMimic character without motion; give one of its motion files".to_owned())
+            Err(Explanation::input("a DeepMimic character without motion")
+                .remedy("give one of its motion files"))
         }
-        Ok(_) => Err(
-            "JSON with neither `asset` (glTF) nor `Frames` (DeepMimic); give one of these"
-                .to_owned(),
-        ),
-        Err(e) => Err(format!("broken JSON ({e}); write the file again")),
+        Ok(_) => Err(Explanation::input(
+            "JSON with neither `asset` (glTF) nor `Frames` (DeepMimic)",
+        )
+        .remedy("give a glTF or DeepMimic file")),
+        Err(e) => Err(Explanation::input(format!("broken JSON ({e})"))
+            .remedy("write or download the file again")),
     }
 }
 
-fn refusal(text: &[u8]) -> String {
+fn refusal(text: &[u8]) -> Explanation {
     let head = &text[..text.len().min(HEAD)];
     let says = |word: &[u8]| head.windows(word.len()).any(|w| w == word);
-    let kind = if text.is_empty() {
-        "an empty file; write it again"
+    let (kind, remedy) = if text.is_empty() {
+        ("an empty file", "write or download it again")
     } else if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\x1f\x8b") {
-        "a packed archive; unpack it first"
+        ("a packed archive", "unpack it first")
     } else if head.starts_with(b"BLENDER") {
-        "a Blender file; export it as FBX or glTF"
+        ("a Blender file", "export it as FBX or glTF")
     } else if says(b"<COLLADA") {
-        "a COLLADA file; convert it to FBX, glTF or BVH"
+        ("a COLLADA file", "convert it to FBX, glTF or BVH")
     } else {
-        "no format that is known; give FBX, glTF, GLB, BVH, AMC or DeepMimic JSON"
+        let known = "give FBX, glTF, GLB, BVH, AMC or DeepMimic JSON";
+        ("an unknown format", known)
     };
-    kind.to_owned()
+    Explanation::input(kind).remedy(remedy)
 }
 
 #[cfg(test)]
@@ -148,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn our_own_files_are_sent_where_they_belong() {
+    fn our_own_files_are_told_apart() {
         let file = |format: &str| {
             let mimic = serde_json::json!({ "version": 1, "format": format }).to_string();
             let head = serde_json::json!({ "__metadata__": { "mimic": mimic } }).to_string();
@@ -160,24 +167,27 @@ mod tests {
                 bytes
             })
         };
-        for (format, place) in [("clip", "mimic retarget"), ("motion", "mimic tracks")] {
+        for format in ["clip", "motion"] {
             for bytes in file(format) {
                 let refused = detect(&bytes).expect_err("refused");
-                assert!(
-                    refused.contains(format) && refused.contains(place),
-                    "{refused}"
-                );
+                assert!(refused.cause.contains(format), "{refused}");
+                let remedy = refused.remedy.expect("a remedy").advice;
+                assert!(remedy.contains(&format!("`.{format}`")), "{remedy}");
             }
         }
     }
 
     #[test]
     fn what_cannot_be_read_is_named() {
-        let refused = |bytes: &[u8]| detect(bytes).expect_err("refused");
+        let refused = |bytes: &[u8]| {
+            let refused = detect(bytes).expect_err("refused");
+            assert!(refused.remedy.is_some(), "{refused}");
+            refused.cause
+        };
         assert!(refused(b"").contains("empty"));
         assert!(refused(b"{\"Skeleton\":{}}").contains("character"));
         assert!(refused(b"{\"a\":1}").contains("glTF"));
         assert!(refused(b"{\"a\":").contains("broken JSON"));
-        assert!(refused(&[0xff; 10_000]).contains("no format"));
+        assert!(refused(&[0xff; 10_000]).contains("unknown format"));
     }
 }

@@ -1,127 +1,189 @@
 //! What can go wrong between a file and a clip.
 
-use super::acclaim::AcclaimError;
-use super::bvh::BvhError;
-use super::deepmimic::DeepMimicError;
-use super::fbx::FbxError;
-use super::gltf::GltfError;
 use crate::clip;
-use crate::humanoid::NotHumanoid;
+use crate::explain::{Explain, Explanation, Parameter, explained};
+use crate::humanoid;
+use std::path::PathBuf;
 
-/// Why a file couldn't become a clip. Every message names the file and says what to do.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    #[error("{file}: cannot be read ({source}); check the path and its permissions")]
-    Io {
-        file: String,
-        source: std::io::Error,
-    },
-    #[error("{file}: {size} bytes are more than the {limit} that are read; split the file")]
-    TooLarge { file: String, size: u64, limit: u64 },
-    #[error("{file}: {}", one_line(reason))]
-    Unsupported { file: String, reason: String },
-    #[error("{file}: {}", one_line(source))]
-    Fbx { file: String, source: FbxError },
-    #[error("{file}: {}", one_line(source))]
-    Gltf { file: String, source: GltfError },
-    #[error("{file}: {}", one_line(source))]
-    Bvh { file: String, source: BvhError },
-    #[error("{file}: {}", one_line(source))]
-    Acclaim { file: String, source: AcclaimError },
-    #[error("{file}: {}", one_line(source))]
-    DeepMimic {
-        file: String,
-        source: DeepMimicError,
-    },
-    #[error("{file}: {reason}")]
-    NoTakes { file: String, reason: &'static str },
-    #[error("{file}: holds no joints; export it with its skeleton")]
-    NoJoints { file: String },
-    #[error("{file}: no take `{wanted}`; it has {}", one_line(takes))]
-    UnknownTake {
-        file: String,
-        wanted: String,
-        takes: String,
-    },
-    #[error("{file}: {}", one_line(reason))]
-    Take { file: String, reason: String },
-    #[error(
-        "{file}: trim {from}..{to} s leaves nothing of take `{}`, which lasts {duration} s; trim within it",
-        one_line(take)
-    )]
-    EmptyTrim {
-        file: String,
-        take: String,
-        from: f64,
-        to: f64,
-        duration: f64,
-    },
-    #[error(
-        "{file}: a rate of {fps} frames per second can't be sampled; give a positive number up to 10000 with --fps"
-    )]
-    Rate { file: String, fps: f64 },
-    #[error(
-        "{file}: a unit of {unit_m} m can't be used; give a positive number of metres with --unit"
-    )]
-    Unit { file: String, unit_m: f64 },
-    #[error(
-        "{file}: take `{}` would have {frames} frames of {nodes} nodes; shorten it with --trim or lower --fps",
-        one_line(take)
-    )]
-    TooLong {
-        file: String,
-        take: String,
-        frames: f64,
-        nodes: usize,
-    },
-    #[error(
-        "{file}: joint `{}` has no finite place {place}; repair its keys in the tool that wrote them",
-        one_line(joint)
-    )]
-    NotFinite {
-        file: String,
-        joint: String,
-        place: String,
-    },
-    #[error(
-        "{file}: left and right aren't known, so it can't be mirrored: {source}; import it without, then `mimic edit --mirror --map FILE`"
-    )]
-    NoSides { file: String, source: NotHumanoid },
-    #[error("{file}: {}", one_line(source))]
-    Mirror { file: String, source: clip::Error },
+/// Why a file couldn't become a clip.
+#[derive(Debug)]
+pub struct Error {
+    /// The file that was to be imported.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub kind: ErrorKind,
 }
 
-/// Most characters that are kept of each end of a text.
-const MOST: usize = 400;
+/// What can be wrong with an animation file, or with what was asked of it.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The system didn't give the file.
+    Read {
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is larger than what is read.
+    TooLarge {
+        /// Bytes of the file.
+        size: u64,
+        /// Most bytes that are read.
+        limit: u64,
+    },
+    /// The file has no format that can be read, or breaks its format, or the take that was asked for does. The
+    /// explanation says where and what to do; it names a file of its own where a file beside the imported one is at fault.
+    Malformed(Box<Explanation>),
+    /// The file has no animation.
+    NoTakes(NoTakes),
+    /// The file has no joints.
+    NoJoints,
+    /// No take has the name or number that was asked for.
+    UnknownTake {
+        /// What was asked for.
+        wanted: String,
+        /// The takes of the file, with their numbers, at most eight of them.
+        takes: String,
+    },
+    /// A part of the take without a frame in it.
+    EmptyTrim {
+        /// Name of the take.
+        take: String,
+        /// Start of the part, seconds from the take's start.
+        from: f64,
+        /// End of the part, seconds.
+        to: f64,
+        /// Length of the take, seconds.
+        duration: f64,
+    },
+    /// A frame rate that can't be sampled.
+    Rate {
+        /// Frames per second.
+        fps: f64,
+    },
+    /// A unit of length that isn't a positive number.
+    Unit {
+        /// Metres per unit.
+        unit_m: f64,
+    },
+    /// More frames than a file of this size may be sampled to.
+    TooLong {
+        /// Name of the take.
+        take: String,
+        /// How many frames it would have.
+        frames: f64,
+        /// How many nodes would be placed at each of them.
+        nodes: usize,
+    },
+    /// A joint whose place isn't finite, or is farther away than any motion goes.
+    NotFinite {
+        /// Name of the joint.
+        joint: String,
+        /// Seconds in the take; `None` at rest.
+        time: Option<f64>,
+    },
+    /// A figure to be mirrored of which left and right aren't known.
+    NoSides {
+        /// Why they aren't.
+        source: humanoid::Error,
+    },
+    /// A figure that can't be mirrored.
+    Mirror {
+        /// Why it can't.
+        source: clip::Error,
+    },
+}
 
-/// A text with what a file put into it, such as names, without line ends or other control characters, and without its
-/// middle where it is long: the end says what to do.
-fn one_line(text: &impl ToString) -> String {
-    let plain = |c: char| if c.is_control() { ' ' } else { c };
-    let letters: Vec<char> = text.to_string().chars().map(plain).collect();
-    match letters.len() > 2 * MOST {
-        true => {
-            let (start, end) = (&letters[..MOST], &letters[letters.len() - MOST..]);
-            start.iter().chain(&['…']).chain(end).collect()
+/// What a file without takes holds instead, and what to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoTakes {
+    /// Goes on from "the file".
+    pub(crate) cause: &'static str,
+    pub(crate) remedy: &'static str,
+}
+
+explained!(Error);
+
+impl Explain for Error {
+    fn explain(&self) -> Explanation {
+        let explanation = self.kind.explain();
+        match explanation.file {
+            Some(_) => explanation,
+            None => explanation.file(&self.file),
         }
-        false => letters.into_iter().collect(),
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The error of a format's reader, as one of the importer's.
+pub(super) fn malformed(error: impl Explain) -> ErrorKind {
+    ErrorKind::Malformed(Box::new(error.explain()))
+}
 
-    #[test]
-    fn messages_are_one_line_of_bearable_length() {
-        let take = |name: &str| Error::Take {
-            file: "a.fbx".to_owned(),
-            reason: format!("take `{name}` is broken; export it again"),
-        };
-        let said = take("a\r\nb\u{1b}[2J").to_string();
-        assert_eq!(said, "a.fbx: take `a  b [2J` is broken; export it again");
-        let said = take(&"ö".repeat(100_000)).to_string();
-        assert!(said.chars().count() < 1000 && said.ends_with("ö` is broken; export it again"));
+impl ErrorKind {
+    fn explain(&self) -> Explanation {
+        let wrong = |cause: String| Explanation::input(cause);
+        let in_take = |take: &str, cause| wrong(cause).place(format!("take `{take}`"));
+        match self {
+            Self::Read { source } => wrong(format!("cannot be read ({source})"))
+                .remedy("check the path and its permissions"),
+            Self::TooLarge { size, limit } => wrong(format!(
+                "its {size} bytes are more than the {limit} that can be read"
+            ))
+            .remedy("split the file"),
+            Self::Malformed(explanation) => (**explanation).clone(),
+            Self::NoTakes(NoTakes { cause, remedy }) => {
+                wrong(format!("the file {cause}")).remedy(remedy)
+            }
+            Self::NoJoints => {
+                wrong("the file holds no joints".to_owned()).remedy("export it with its skeleton")
+            }
+            Self::UnknownTake { wanted, takes } => wrong(format!("no take is called `{wanted}`"))
+                .remedy_by(Parameter::Take, format!("choose one of {takes}")),
+            Self::EmptyTrim {
+                take,
+                from,
+                to,
+                duration,
+            } => in_take(
+                take,
+                format!("the part from {from} s to {to} s is empty: the take lasts {duration} s"),
+            )
+            .remedy_by(Parameter::Trim, "choose a part within the take"),
+            Self::Rate { fps } => {
+                wrong(format!("{fps} frames per second is not a usable frame rate"))
+                    .remedy_by(Parameter::FrameRate, "give a positive number up to 10000")
+            }
+            Self::Unit { unit_m } => wrong(format!("{unit_m} m is not a usable unit of length"))
+                .remedy_by(Parameter::Unit, "give a positive number of metres"),
+            Self::TooLong {
+                take,
+                frames,
+                nodes,
+            } => in_take(
+                take,
+                format!("it would have {frames} frames of {nodes} nodes, too many for a file of this size"),
+            )
+            .remedy_by(
+                Parameter::Trim,
+                "keep a part of it, or lower the frame rate",
+            ),
+            Self::NotFinite { joint, time } => {
+                let place = match time {
+                    Some(time) => format!("joint `{joint}` at {time:.3} s"),
+                    None => format!("joint `{joint}` at rest"),
+                };
+                wrong("its position is not finite, or too large to use".to_owned())
+                    .place(place)
+                    .remedy("repair its keys in the tool that wrote the file")
+            }
+            Self::NoSides { source } => wrong(format!(
+                "it can't be mirrored, because left and right aren't known: {}",
+                source.explain().cause
+            ))
+            .remedy_by(
+                Parameter::JointMap,
+                "import it as it is, then mirror the clip with a joint map",
+            ),
+            Self::Mirror { source } => source.explain(),
+        }
     }
 }

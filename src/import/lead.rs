@@ -1,17 +1,19 @@
-//! A first frame that is no part of the motion: many a recording begins with the pose that its rig was bound in.
+//! A first frame apart from the motion: many recordings begin with one frame of the pose that their rig was bound in.
 
 use super::seam::{difference, extent, moving_places, rms};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use nalgebra::Isometry3;
 
-/// The step away from such a frame is so many times the longest step of the motion, …
+/// The step away from such a frame is longer than this many times the longest step between later frames. Chosen: a
+/// motion gathers speed over several frames, so its first step isn't the longest by far.
 const OF_LONGEST: f64 = 2.5;
-/// … and at least this long (root mean square over the joints), relative to the figure's size.
+/// The step (root mean square over the joints) is also longer than this fraction of the figure's size. Chosen: 3 to 4 cm in a
+/// person; what is smaller isn't seen, and a take that hardly moves could begin with it.
 const LEAST: f64 = 0.02;
-/// Fewest frames that tell how long a motion's steps are.
+/// Fewest frames that tell how long a motion's steps are. Chosen.
 const FEWEST: usize = 10;
 
-/// Whether the motion doesn't go on from the first frame of these world transforms.
+/// Whether the first frame of these world transforms is a pose apart from the motion after it.
 pub(super) fn is_apart(world: &[Vec<Isometry3<f64>>]) -> bool {
     if world.len() < FEWEST {
         return false;
@@ -24,12 +26,10 @@ pub(super) fn is_apart(world: &[Vec<Isometry3<f64>>]) -> bool {
 }
 
 pub(super) fn problem() -> Problem {
-    Problem {
-        id: "first-frame-left-out".to_owned(),
-        severity: Severity::Note,
-        message: "the first frame is a pose from which the motion doesn't go on, so it was left out; keep it with `mimic import --trim 0..`"
-            .to_owned(),
-    }
+    Problem::note(
+        "first-frame-left-out",
+        "the first frame is a pose apart from the motion and was left out; keep it by trimming from 0 s",
+    )
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What formats without units or exact rates leave to be found out.
 
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use nalgebra::Vector3;
 
 /// Frames per second of a frame time as it is written, `None` where it is no time that frames can have.
@@ -66,15 +66,14 @@ impl Scale {
     }
 
     pub fn problem(&self) -> Option<Problem> {
-        Some(Problem {
-            id: "unit-guessed".to_owned(),
-            severity: Severity::Note,
-            message: format!(
-                "no unit is stated: {} make the figure {:.2} m, the nearest to a person's size; give another with --unit",
+        Some(Problem::note(
+            "unit-guessed",
+            format!(
+                "the file states no unit: {} make the figure {:.2} m tall, the nearest to a person's size; give the unit where that is wrong",
                 self.name,
                 self.size * self.unit_m
             ),
-        })
+        ))
     }
 }
 
@@ -86,14 +85,10 @@ pub(crate) fn unit(stated: Option<f64>, rest: &[Vector3<f64>]) -> (f64, Option<P
         Some(unit_m) => {
             let tall = scale.size * unit_m;
             let message = format!(
-                "the stated unit makes the figure {tall:.3} m tall: {} are taken instead; give another with --unit",
+                "the stated unit would make the figure {tall:.3} m tall: {} are used instead; give the unit where that is wrong",
                 scale.name
             );
-            let problem = Problem {
-                id: "unit-guessed".to_owned(),
-                severity: Severity::Warning,
-                message,
-            };
+            let problem = Problem::warning("unit-guessed", message);
             (scale.unit_m, Some(problem))
         }
         None => (scale.unit_m, scale.problem()),

@@ -1,20 +1,23 @@
 //! Which part of a take is read, and at what times.
 
-use super::Error;
+use super::error::ErrorKind;
 use super::scene::{Scene, Take};
 use crate::clip::{Grid, MOST_TRANSFORMS, Margin};
 use std::ops::Range;
 
-/// Nodes or channels that may be looked at for each transform: most of a file's nodes may be no joints.
+/// Nodes or channels that may be evaluated for each transform that is kept: most of a file's nodes may not be joints.
+/// Chosen: room for a rig with many helpers and controls per joint.
 const LOOKS_PER_TRANSFORM: usize = 8;
-/// Joints that a frame counts for at least, as it takes memory of its own.
+/// Joints that a frame counts as at least, because the list that holds it takes memory of its own.
 const LEAST_JOINTS: usize = 2;
 
-/// Parts of a frame by which a part may miss frames of the whole take and still be of these frames.
+/// How far, in frames, the ends of a part may be from frames of the whole take and still mean these frames. Chosen: times
+/// are typed with two or three digits after the point, and 0.01 frames at 30 Hz are 0.3 ms.
 const ON_FRAME: f64 = 0.01;
 
-/// A part of a take, sampled with what is around it.
+/// The times at which a part of a take, and what is around it, is sampled.
 pub(super) struct Part {
+    /// Frames per second, Hz.
     pub fps: f64,
     /// Times of all frames, in the take's own seconds.
     pub times: Vec<f64>,
@@ -23,16 +26,16 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// `most` bounds the frames of the part and of what is around it.
+    /// The part `span` of `take`, in the take's own seconds, at about `fps` Hz: at the nearest rate at which a frame falls on
+    /// its end. At most `most` frames, what is around it included.
     pub fn new(
         scene: &dyn Scene,
-        file: &str,
         take: &Take,
         span: Range<f64>,
         fps: f64,
         most: usize,
-    ) -> Result<Part, Error> {
-        let grid = grid(scene, file, take, span.end - span.start, fps, most)?;
+    ) -> Result<Part, ErrorKind> {
+        let grid = grid(scene, take, span.end - span.start, fps, most)?;
         let part = Part::of_whole(take, &span, fps).unwrap_or_else(|| {
             let time = |f: usize| span.start + grid.time(f);
             let (first, last) = (time(0), time(grid.frames - 1));
@@ -49,7 +52,8 @@ impl Part {
         Ok(part.of_at_most(most))
     }
 
-    /// A part that begins and ends with a frame of the whole take is sampled when that is, to the last bit.
+    /// A part that begins and ends at frames of the whole take is sampled at exactly their times, so that it is equal to that
+    /// part of the whole clip, bit for bit.
     fn of_whole(take: &Take, span: &Range<f64>, fps: f64) -> Option<Part> {
         let whole = Grid::new(take.end - take.start, fps, MOST_TRANSFORMS)?;
         let frame = |time: f64| {
@@ -69,6 +73,7 @@ impl Part {
         })
     }
 
+    /// Drops the first of all frames.
     pub fn leave_out_first(&mut self) {
         self.times.remove(0);
         self.own = match self.own.start {
@@ -77,7 +82,7 @@ impl Part {
         };
     }
 
-    /// With less around it, where there would be more frames than `most`.
+    /// The part with less around it, where there would be more than `most` frames.
     fn of_at_most(mut self, most: usize) -> Part {
         let left = most.saturating_sub(self.own.len());
         let before = self.own.start.min(left);
@@ -89,15 +94,14 @@ impl Part {
 }
 
 /// Start and end, in the take's own seconds, of the part to keep.
-pub(super) fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<Range<f64>, Error> {
+pub(super) fn span(take: &Take, trim: Option<(f64, f64)>) -> Result<Range<f64>, ErrorKind> {
     let Some((from, to)) = trim else {
         return Ok(take.start..take.end);
     };
     let duration = take.end - take.start;
     let (start, end) = (from.max(0.0), to.min(duration));
     if !(from <= to && start <= end) {
-        return Err(Error::EmptyTrim {
-            file: file.to_owned(),
+        return Err(ErrorKind::EmptyTrim {
             take: take.name.clone(),
             from,
             to,
@@ -107,8 +111,8 @@ pub(super) fn span(take: &Take, file: &str, trim: Option<(f64, f64)>) -> Result<
     Ok(take.start + start..take.start + end)
 }
 
-/// Most frames that a take may be sampled to, given the most `transforms`: what is kept are the joints, but the time
-/// goes to all nodes and channels.
+/// Most frames that a take may be sampled to, given the most `transforms`. Memory goes to the joints, which are kept; time
+/// goes to all nodes and channels, which are evaluated.
 pub(super) fn most_frames(
     scene: &dyn Scene,
     take: &Take,
@@ -123,21 +127,16 @@ pub(super) fn most_frames(
 
 fn grid(
     scene: &dyn Scene,
-    file: &str,
     take: &Take,
     duration: f64,
     fps: f64,
     most: usize,
-) -> Result<Grid, Error> {
+) -> Result<Grid, ErrorKind> {
     let nodes = scene.nodes().len();
     let Some(one) = Grid::new(0.0, fps, 2) else {
-        return Err(Error::Rate {
-            file: file.to_owned(),
-            fps,
-        });
+        return Err(ErrorKind::Rate { fps });
     };
-    Grid::new(duration, one.fps, most).ok_or_else(|| Error::TooLong {
-        file: file.to_owned(),
+    Grid::new(duration, one.fps, most).ok_or_else(|| ErrorKind::TooLong {
         take: take.name.clone(),
         frames: (duration * fps).round() + 1.0,
         nodes,

@@ -1,7 +1,9 @@
 //! What a reader gives to the importer: a tree of nodes, its takes, and where every node is at any time.
 
-use super::UpAxis;
+use super::axes::UpAxis;
+use super::error::NoTakes;
 use crate::clip::Problem;
+use crate::explain::Explanation;
 use nalgebra::{Matrix3, Matrix4};
 
 /// One node of the file's tree. Parents stand before their children.
@@ -49,7 +51,7 @@ pub(crate) struct Take {
     /// What the reader found wrong, or left out, in this take.
     pub problems: Vec<Problem>,
     /// Why this take can't be used, and what to do.
-    pub fault: Option<String>,
+    pub fault: Option<Box<Explanation>>,
 }
 
 impl Take {
@@ -77,7 +79,7 @@ pub(crate) struct Contents {
     pub nodes: Vec<Node>,
     pub takes: Vec<Take>,
     /// What the file lacks if it has no takes, and what to do.
-    pub no_takes: &'static str,
+    pub no_takes: NoTakes,
     /// Up axis of the file's coordinates, e.g. `+Y`.
     pub up_axis: String,
     /// Metres per unit of the file's coordinates.
@@ -100,7 +102,10 @@ impl Contents {
             format,
             nodes,
             takes,
-            no_takes: "holds no animation; export it with at least one take",
+            no_takes: NoTakes {
+                cause: "holds no animation",
+                remedy: "export it with at least one take",
+            },
             up_axis: up.to_string(),
             unit_m: 1.0,
             canonical_from_file: up.canonical_from_file(),

@@ -1,34 +1,32 @@
 //! Which take of a file is meant.
 
-use super::Error;
+use super::error::ErrorKind;
+use super::names::first_few;
 use super::scene::Scene;
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use nalgebra::Matrix4;
 
-/// How often a take's motion is looked at when it has to be compared with others.
+/// At how many times a take is evaluated to see whether anything moves in it. Chosen: a motion that is the same pose at nine
+/// uneven times is none.
 const LOOKS: usize = 9;
-/// The looks' places in a take are fractions of this number's multiples, which no number of equal cycles repeats at:
-/// (√5 − 1) / 2.
+/// The k-th time is at the fraction of k · (√5 − 1) / 2 of the take: multiples of the golden ratio never meet the same phase
+/// of any number of equal cycles, as even times would.
 const UNEVEN: f64 = 0.618_033_988_749_894_8;
 
-/// Most node placements that takes are compared by; a file with more is judged by what has curves alone.
+/// Most nodes that are placed to compare takes. In a file with more, what has curves counts as moving. Chosen, so
+/// that a small file can't make the comparison take minutes.
 const MOST_PLACEMENTS: usize = 1 << 22;
 
 /// The take called `wanted` (its name, its name in other letter case, its name behind a `|`, or its number
 /// counted from 1), or the one with most motion, with a note when there was a choice.
 pub(crate) fn choose(
     scene: &dyn Scene,
-    file: &str,
     wanted: Option<&str>,
-) -> Result<(usize, Option<Problem>), Error> {
+) -> Result<(usize, Option<Problem>), ErrorKind> {
     if scene.takes().is_empty() {
-        return Err(Error::NoTakes {
-            file: file.to_owned(),
-            reason: scene.contents().no_takes,
-        });
+        return Err(ErrorKind::NoTakes(scene.contents().no_takes));
     }
-    let unknown = |wanted: &str| Error::UnknownTake {
-        file: file.to_owned(),
+    let unknown = |wanted: &str| ErrorKind::UnknownTake {
         wanted: wanted.to_owned(),
         takes: list(scene),
     };
@@ -40,10 +38,7 @@ pub(crate) fn choose(
         }
     };
     match &scene.takes()[take].fault {
-        Some(reason) => Err(Error::Take {
-            file: file.to_owned(),
-            reason: reason.clone(),
-        }),
+        Some(fault) => Err(ErrorKind::Malformed(fault.clone())),
         None => Ok((take, note)),
     }
 }
@@ -79,7 +74,7 @@ fn find(scene: &dyn Scene, wanted: &str) -> Option<usize> {
 
 fn list(scene: &dyn Scene) -> String {
     let takes = scene.takes().iter().enumerate();
-    super::few(takes.map(|(at, take)| format!("{} `{}`", at + 1, take.name)))
+    first_few(takes.map(|(at, take)| format!("{} `{}`", at + 1, take.name)))
 }
 
 /// The take in which most nodes move for longest; the first of equals.
@@ -98,8 +93,8 @@ pub(crate) fn most_motion(scene: &dyn Scene) -> usize {
     best.0
 }
 
-/// Animated nodes × seconds, nought for a take in which nothing changes place, as far as that is looked at, and less
-/// for one that can't be used.
+/// Animated nodes × seconds: zero for a take in which nothing moves at the times that are evaluated, and −1 for one that
+/// can't be used.
 fn amount(scene: &dyn Scene, take: usize) -> f64 {
     let Some(about) = scene.takes().get(take) else {
         return 0.0;
@@ -129,7 +124,8 @@ fn amount(scene: &dyn Scene, take: usize) -> f64 {
     if moves { all } else { 0.0 }
 }
 
-/// Whether some node is elsewhere, or turned.
+/// Whether some node moved by more than `shift`, or its axes changed by more than a millionth of their length: sixteen times
+/// the rounding of the 32-bit numbers in files.
 fn differ(a: &[Matrix4<f64>], b: &[Matrix4<f64>], shift: f64) -> bool {
     let moved = |(a, b): (&Matrix4<f64>, &Matrix4<f64>)| {
         let change = b - a;
@@ -145,12 +141,11 @@ fn note(scene: &dyn Scene, take: usize) -> Problem {
         .takes()
         .get(take)
         .map_or("", |take| take.name.as_str());
-    Problem {
-        id: "several-takes".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "took `{name}`, which has most motion, of {}; choose with --take",
+    Problem::note(
+        "several-takes",
+        format!(
+            "chose take `{name}`, which has the most motion, from {}",
             list(scene)
         ),
-    }
+    )
 }

@@ -1,13 +1,14 @@
 //! Which nodes of a file are joints.
 
+use super::names::first_few;
 use super::scene::{Node, Scene};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 
 /// Indices of the nodes that become joints, parents before children.
 ///
-/// They are the nodes that the file marks as bones and those that some take moves (skins leave out the parts of a
-/// figure that carry whole meshes), with all nodes above and below; all nodes where there are none of either. Leaves
-/// that hold a mesh, camera or light are no joints, unless they are bones or all that moves in a file without bones.
+/// Joints are the nodes that the file marks as bones, and those that some take moves: skins leave out parts of a figure that
+/// carry a whole mesh, such as a helmet. All nodes above and below them are joints too. A file with neither has all its nodes
+/// as joints. A leaf that holds a mesh, camera or light is not a joint, unless it is a bone, or moves in a file without bones.
 pub(crate) fn joints(scene: &dyn Scene) -> Vec<usize> {
     let nodes = scene.nodes();
     let moved = moved(scene);
@@ -16,6 +17,7 @@ pub(crate) fn joints(scene: &dyn Scene) -> Vec<usize> {
     for parent in nodes.iter().filter_map(|node| node.parent) {
         has_child[parent] = true;
     }
+    // What is kept even as a leaf with a mesh.
     let stays = |node: usize| nodes[node].is_bone || moved[node] && (!has_bones || has_child[node]);
     let stays: Vec<bool> = (0..nodes.len()).map(stays).collect();
     let wanted = |node: usize| stays[node] || moved[node] && nodes[node].is_plain;
@@ -29,7 +31,7 @@ pub(crate) fn joints(scene: &dyn Scene) -> Vec<usize> {
     (0..nodes.len()).filter(|&node| kept[node]).collect()
 }
 
-/// Tells of nodes that `take` moves and that aren't among the `joints`.
+/// A note about nodes that `take` moves and that aren't among the `joints`.
 pub(crate) fn left_out(scene: &dyn Scene, joints: &[usize], take: usize) -> Option<Problem> {
     let nodes = scene.nodes();
     let moved = &scene.takes().get(take)?.animated;
@@ -37,13 +39,14 @@ pub(crate) fn left_out(scene: &dyn Scene, joints: &[usize], take: usize) -> Opti
         .iter()
         .filter(|node| joints.binary_search(node).is_err());
     let names: Vec<&str> = lost.map(|&node| nodes[node].name.as_str()).collect();
-    let list = super::few(names.iter().map(|name| format!("`{name}`")));
-    (!names.is_empty()).then(|| Problem {
-        id: "moving-nodes-left-out".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "the take moves {list}, which hold meshes, cameras or lights and are no joints"
-        ),
+    let list = first_few(names.iter().map(|name| format!("`{name}`")));
+    (!names.is_empty()).then(|| {
+        Problem::note(
+            "moving-nodes-left-out",
+            format!(
+                "the take moves {list}, which hold meshes, cameras or lights and aren't joints"
+            ),
+        )
     })
 }
 

@@ -4,7 +4,7 @@
 //! pose and, on the whole, in the motion: where both agree on an axis that isn't the stated one, it is up.
 
 use super::axes::UpAxis;
-use crate::clip::{Joint, Problem, Severity};
+use crate::clip::{Joint, Problem};
 use crate::humanoid::{self, HumanoidMap, Slot};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -52,13 +52,12 @@ impl Stature {
 }
 
 pub(crate) fn problem(stated: &str, up: UpAxis) -> Problem {
-    Problem {
-        id: "up-axis-corrected".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "the figure stands along {up}, not {stated}: {up} is taken as up; --up {stated} takes the file at its word"
+    Problem::note(
+        "up-axis-corrected",
+        format!(
+            "the figure stands along {up}, not {stated}: {up} is used as up; give {stated} as the up axis to keep the file's"
         ),
-    }
+    )
 }
 
 /// The axis, with its sign, that a vector clearly runs along.

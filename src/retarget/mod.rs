@@ -33,7 +33,7 @@ mod travel;
 pub use report::{MappedJoint, Report, Spread};
 
 use crate::clip::{Clip, LoopMode, MOST_FPS};
-use crate::humanoid::{self, HumanoidMap, NotHumanoid, Slot};
+use crate::humanoid::{self, HumanoidMap, Slot};
 use crate::motion::{Cycle, Draft, Motion};
 use crate::skeleton::{JointKind, Skeleton};
 use fit::{Fit, Fitted};
@@ -68,7 +68,10 @@ pub struct Options {
 #[derive(Debug, thiserror::Error)]
 pub enum RetargetError {
     #[error("clip `{clip}` is no humanoid: {reason}")]
-    NotHumanoid { clip: String, reason: NotHumanoid },
+    NotHumanoid {
+        clip: String,
+        reason: humanoid::Error,
+    },
     #[error(
         "the joint map puts joint number {joint} in slot `{slot}`, but the clip has only {count}"
     )]

@@ -218,7 +218,7 @@ fn attempt(name: &str, bytes: &[u8], folder: &Path, options: &Options) -> Seen {
         Err(_) => Some("it panics".to_owned()),
         Ok(Err(error)) => {
             let text = error.to_string();
-            let clear = text.starts_with(name) && text.len() < 2000 && !text.contains(['\n', '\r']);
+            let clear = text.starts_with('`') && text.len() < 2000 && !text.contains(['\n', '\r']);
             (!clear).then(|| format!("no clear line: {text:.300?}"))
         }
         Ok(Ok(clip)) => {

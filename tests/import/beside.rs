@@ -107,7 +107,7 @@ fn a_few_bytes_cannot_ask_for_millions_of_transforms() {
     let text = synthetic(|f| f["buffers"][0]["uri"] = json!(uri));
     let error = refusal(text.as_bytes());
     assert!(
-        error.contains("`turn`") && error.contains("--trim"),
+        error.contains("`turn`") && error.contains("keep a part"),
         "{error}"
     );
 }

@@ -243,7 +243,10 @@ fn broken_files_are_refused_by_line() {
         let text = AWKWARD.replacen(from, to, 1);
         assert_ne!(text, AWKWARD, "{from}");
         let said = read(&text).expect_err(to);
-        assert!(said.starts_with(&format!("a.bvh: line {line}: ")), "{said}");
+        assert!(
+            said.starts_with(&format!("`a.bvh`: line {line}: ")),
+            "{said}"
+        );
         assert!(said.contains(says), "{said}");
     }
 }
@@ -282,6 +285,6 @@ fn figures_that_stand_along_another_axis_are_set_upright() {
             ..Options::default()
         };
         let taken = import::load(Path::new(&path), &word).expect("it imports");
-        assert_eq!(taken.source.up_axis, "+Y", "{name}: --up counts");
+        assert_eq!(taken.source.up_axis, "+Y", "{name}: the option counts");
     }
 }

@@ -215,7 +215,7 @@ fn refused(name: &str, bytes: &[u8]) {
     let said = read(bytes).expect_err(name);
     assert!(start.elapsed() < Duration::from_secs(10), "{name}");
     assert!(
-        said.starts_with("kick.fbx: ") && said.lines().count() == 1,
+        said.starts_with("`kick.fbx`: ") && said.lines().count() == 1,
         "{said}"
     );
 }
@@ -294,7 +294,7 @@ fn damaged_files_are_refused_or_read_whole() {
                     let mut locals = clip.frames.iter().flatten();
                     assert!(locals.all(|t| t.to_homogeneous().iter().all(|x| x.is_finite())));
                 }
-                Err(said) => assert!(said.starts_with("kick.fbx: "), "{said}"),
+                Err(said) => assert!(said.starts_with("`kick.fbx`: "), "{said}"),
             }
         }
         assert!((1..400).contains(&read_still), "{read_still}");

@@ -2,6 +2,7 @@
 //!
 //! `MIMIC_WRITE_DOCS=1` writes it. Without the feature `ufbx`, some of these files are refused and the table is another.
 
+use mimic::explain::Explain;
 use mimic::humanoid;
 use mimic::import::{self, Inspection, Options};
 use mimic_test_support::foreign;
@@ -26,12 +27,11 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     paths.into_iter().flat_map(below).filter(is_own).collect()
 }
 
-/// A message without the name of its file before it.
-fn reason(error: &dyn std::fmt::Display, path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let message = error.to_string();
-    let reason = message.strip_prefix(&*format!("{name}: "));
-    reason.unwrap_or(&message).replace('|', "\\|")
+/// A message without its file, whose row it stands in.
+fn reason(error: &impl Explain) -> String {
+    let mut explanation = error.explain();
+    explanation.file = None;
+    explanation.to_string().replace('|', "\\|")
 }
 
 struct Row {
@@ -46,7 +46,7 @@ fn row(path: &Path, folder: &Path) -> Row {
     let look = match import::inspect(path) {
         Ok(look) => look,
         Err(error) => {
-            let refused = reason(&error, path);
+            let refused = reason(&error);
             return Row {
                 text: format!("| `{name}` | | | | | refused: {refused} |\n"),
                 is_read: false,
@@ -57,9 +57,9 @@ fn row(path: &Path, folder: &Path) -> Row {
     let read = import::load(path, &Options::default());
     let became = match &read {
         Ok(clip) => format!("read, {} frames", clip.frames.len()),
-        Err(error) => format!("refused: {}", reason(error, path)),
+        Err(error) => format!("refused: {}", reason(error)),
     };
-    let (is_humanoid, humanoid) = humanoid_of(&look, path);
+    let (is_humanoid, humanoid) = humanoid_of(&look);
     let Inspection {
         format,
         takes,
@@ -77,10 +77,10 @@ fn row(path: &Path, folder: &Path) -> Row {
     }
 }
 
-fn humanoid_of(look: &Inspection, path: &Path) -> (bool, String) {
+fn humanoid_of(look: &Inspection) -> (bool, String) {
     match humanoid::map(&look.joints) {
         Ok(map) => (true, format!("yes, {} slots", map.matches.len())),
-        Err(error) => (false, format!("no: {}", reason(&error, path))),
+        Err(error) => (false, format!("no: {}", reason(&error))),
     }
 }
 

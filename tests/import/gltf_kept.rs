@@ -98,7 +98,7 @@ fn a_broken_take_leaves_the_others() {
         .expect_err("refused")
         .to_string();
     assert!(
-        error.starts_with("a.gltf: take `broken`: accessor 9: ") && error.contains("; export"),
+        error.starts_with("`a.gltf`: take `broken`, accessor 9: ") && error.contains("; export"),
         "{error}"
     );
     let look = inspect(&text);
@@ -288,7 +288,7 @@ fn times_that_no_clip_can_hold_are_counted_and_refused() {
         read(&text, None)
             .expect_err("refused")
             .to_string()
-            .contains("--trim")
+            .contains("keep a part")
     );
 }
 

@@ -21,7 +21,10 @@ fn survives(name: &str, bytes: &[u8], rounds: usize) {
             }
             Err(error) => {
                 refused += 1;
-                assert!(error.to_string().starts_with(name), "{error}");
+                assert!(
+                    error.to_string().starts_with(&format!("`{name}`: ")),
+                    "{error}"
+                );
             }
         }
     }

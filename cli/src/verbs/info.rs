@@ -5,7 +5,7 @@ use crate::locate;
 use crate::output::{make_room, write_whole};
 use crate::printer::Printer;
 use mimic::clip::{Clip, Joint, Problem, Severity};
-use mimic::humanoid::{self, HumanoidMap, NotHumanoid, Slot};
+use mimic::humanoid::{self, HumanoidMap, Slot};
 use mimic::import::{self, TakeInfo};
 use serde::Serialize;
 use serde_json::json;
@@ -72,7 +72,7 @@ impl Args {
     }
 }
 
-fn not_humanoid(reason: &NotHumanoid) -> Problem {
+fn not_humanoid(reason: &humanoid::Error) -> Problem {
     Problem {
         id: "not-humanoid".into(),
         severity: Severity::Warning,

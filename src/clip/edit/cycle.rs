@@ -66,15 +66,10 @@ impl Clip {
         ties.min_by_key(|found| (found.end - found.start, found.start))
             .ok_or_else(|| {
                 let duration = self.duration();
-                let reason = if duration < shortest {
-                    "it is shorter than that; allow shorter ones"
+                if duration < shortest {
+                    Error::TooShortForCycle { shortest, duration }
                 } else {
-                    "nothing moves and comes back; choose another part"
-                };
-                Error::NoCycle {
-                    shortest,
-                    duration,
-                    reason,
+                    Error::NoCycle { shortest, duration }
                 }
             })
     }

@@ -24,10 +24,10 @@ use super::{Clip, Error, Problem};
 impl Clip {
     /// What every edit relies on, and a clip that was made by hand may lack.
     pub(super) fn check(&self) -> Result<(), Error> {
-        let unusable = |reason: &str| {
+        let unusable = |reason| {
             Err(Error::Unusable {
                 name: self.name.clone(),
-                reason: reason.to_owned(),
+                reason,
             })
         };
         let count = self.joints.len();

@@ -1,10 +1,12 @@
 //! The same motion in another time.
 
-use super::at_least;
 use crate::clip::{Clip, Error};
 
 /// Longest time that is looked at, s: more can't be sampled anyhow.
 const LONGEST: f64 = 1e9;
+
+/// Smallest factor of speed; a smaller one would stretch the shortest clip over days.
+const SLOWEST: f64 = 1e-6;
 
 impl Clip {
     /// The clip `factor` times as fast, sampled at `fps`.
@@ -13,7 +15,9 @@ impl Clip {
     /// A factor that isn't positive, a rate that can't be sampled, or more frames than a clip may have.
     pub fn speed(&self, factor: f64, fps: f64) -> Result<Clip, Error> {
         self.check()?;
-        let factor = at_least("a speed", factor, 1e-6, "a factor from 0.000001 up")?;
+        if !(factor.is_finite() && factor >= SLOWEST) {
+            return Err(Error::Speed { factor });
+        }
         let duration = self.duration();
         if duration == 0.0 {
             return self.resample(fps);

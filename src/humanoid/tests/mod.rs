@@ -142,10 +142,7 @@ fn a_four_legged_animal_with_human_names_is_refused() {
             (foot, knee, [-0.4, y, 0.05]),
         ]);
     }
-    assert!(matches!(
-        map(&figure(&parts)),
-        Err(NotHumanoid::Quadruped { .. })
-    ));
+    assert!(matches!(map(&figure(&parts)), Err(Error::Quadruped { .. })));
 }
 
 #[test]
@@ -166,7 +163,7 @@ fn a_figure_without_arms_is_refused_by_slot() {
     let error = map(&relinked).unwrap_err();
     assert!(error.to_string().contains("left-upper-arm"), "{error}");
     let cube = figure(&[("Cube", "", [0.0; 3])]);
-    assert_eq!(map(&cube), Err(NotHumanoid::TooFewJoints { joints: 1 }));
+    assert_eq!(map(&cube), Err(Error::TooFewJoints { joints: 1 }));
 }
 
 #[test]
@@ -187,7 +184,10 @@ fn the_map_file_survives_editing_and_names_its_mistakes() {
     assert!(wrong("\"hips\"", "\"hip\"").contains("unknown slot `hip`"));
     assert!(wrong("\"hips\": \"b\"", "\"hips\": \"bb\"").contains("did you mean `b`"));
     assert!(wrong("\"hips\": \"b\"", "\"hips\": \"c\"").contains("both `hips` and `spine`"));
-    assert!(wrong("\"hips\": \"b\"", "\"hips\": null").contains("leaves `hips` empty"));
+    assert!(
+        wrong("\"hips\": \"b\"", "\"hips\": null")
+            .contains("slot `hips`: the joint map leaves it empty")
+    );
     assert!(HumanoidMap::from_json("[]", &joints).is_err());
 }
 

@@ -206,12 +206,12 @@ fn animals_and_toys_are_refused() {
             return;
         };
         assert!(
-            matches!(map(&joints), Err(NotHumanoid::Quadruped { .. })),
+            matches!(map(&joints), Err(Error::Quadruped { .. })),
             "{file}"
         );
     }
     let Some(joints) = gltf_joints("raylib/greenman.glb") else {
         return;
     };
-    assert!(matches!(map(&joints), Err(NotHumanoid::Missing { .. })));
+    assert!(matches!(map(&joints), Err(Error::Missing { .. })));
 }

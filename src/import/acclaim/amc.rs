@@ -1,9 +1,10 @@
 //! AMC: rows of numbers for a skeleton's bones, frame after frame.
 
-use super::AcclaimError;
 use super::asf::{Freedom, Skeleton};
+use super::error::AcclaimError;
 use super::lines::{Line, lines, short};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
+use crate::import::names::first_few;
 use std::collections::BTreeMap;
 
 /// A bone's place in a row.
@@ -119,9 +120,10 @@ impl Reader<'_> {
     fn check_whole(&self, line: &Line) -> Result<(), AcclaimError> {
         let (named, all) = (self.named, self.columns.len());
         if self.begun > 0 && named != all {
-            return Err(line.broken(format!(
-                "the frame before has {named} of the first one's {all} bones; write the file again"
-            )));
+            return Err(line.broken(
+                format!("the frame before has {named} of the first one's {all} bones"),
+                "write the file again",
+            ));
         }
         Ok(())
     }
@@ -129,15 +131,16 @@ impl Reader<'_> {
     fn bone(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
         let name = short(line.key);
         let Some(&bone) = self.bones.get(line.key) else {
-            let reason = "isn't in its skeleton; put the right .asf beside it";
-            return Err(line.broken(format!("bone `{name}` {reason}")));
+            let reason = format!("bone `{name}` isn't in its skeleton");
+            return Err(line.broken(reason, "put the right .asf beside it"));
         };
         let place = match self.places.get(&bone) {
             None if self.begun == 1 => self.columns.len(),
             Some(&(place, frame)) if frame < self.begun => place,
             _ => {
-                let reason = "stands there twice or isn't in the first frame; write the file again";
-                return Err(line.broken(format!("bone `{name}` {reason}")));
+                let reason =
+                    format!("bone `{name}` is in this frame twice or not in the first one");
+                return Err(line.broken(reason, "write the file again"));
             }
         };
         let freedoms = &self.skeleton.bones[bone].freedoms;
@@ -173,13 +176,10 @@ impl Reader<'_> {
         let (named, all) = (self.named, self.columns.len());
         let cut = usize::from(self.begun > 1 && named != all);
         if cut > 0 {
-            self.problems.push(Problem {
-                id: "frame-cut".to_owned(),
-                severity: Severity::Warning,
-                message: format!(
-                    "the last frame has {named} of {all} bones and is left out; the file may be cut"
-                ),
-            });
+            self.problems.push(Problem::warning(
+                "frame-cut",
+                format!("the last frame has {named} of {all} bones and is left out; the file may be cut off"),
+            ));
         }
         if self.begun == 0 || self.width == 0 {
             return Err(AcclaimError::NoFrames);
@@ -211,16 +211,19 @@ impl Reader<'_> {
         }
     }
 
-    /// Tells of bones that change their length, which joints can't.
+    /// A warning about bones that change their length, which joints can't.
     fn stretched(&self) -> Option<Problem> {
         let bones = self.columns.iter().map(|c| &self.skeleton.bones[c.bone]);
         let stretched = bones.filter(|bone| bone.freedoms.contains(&Freedom::Length));
         let names: Vec<String> = stretched.map(|bone| format!("`{}`", bone.name)).collect();
-        let list = crate::import::few(names.iter().cloned());
-        (!names.is_empty()).then(|| Problem {
-            id: "bone-lengths-left-out".to_owned(),
-            severity: Severity::Warning,
-            message: format!("changes of length aren't used, of {list}"),
+        let list = first_few(names.iter().cloned());
+        (!names.is_empty()).then(|| {
+            Problem::warning(
+                "bone-lengths-left-out",
+                format!(
+                    "these bones change their length, which joints can't, so it is left out: {list}"
+                ),
+            )
         })
     }
 }

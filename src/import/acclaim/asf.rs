@@ -1,6 +1,6 @@
 //! ASF: the skeleton.
 
-use super::AcclaimError;
+use super::error::AcclaimError;
 use super::lines::{Line, lines, short};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -184,23 +184,31 @@ impl Reader {
 
     /// Puts the bones in the order of the hierarchy, depth first.
     fn skeleton(mut self) -> Result<Skeleton, AcclaimError> {
-        let broken = |line, reason| Err(AcclaimError::Broken { line, reason });
+        let broken = |line, reason, remedy| {
+            Err(AcclaimError::Broken {
+                line,
+                reason,
+                remedy,
+            })
+        };
         let mut drafts: BTreeMap<String, Draft> = BTreeMap::new();
         for draft in std::mem::take(&mut self.bones) {
             let (line, name) = (draft.line, short(&draft.name));
             if draft.name.is_empty() {
-                return broken(line, "the bone has no name; give it one".to_owned());
+                return broken(line, "the bone has no name".to_owned(), "give it one");
             }
             if draft.name == ROOT || drafts.insert(draft.name.clone(), draft).is_some() {
-                return broken(line, format!("a second bone `{name}`; rename one of them"));
+                let reason = format!("a second bone is called `{name}`");
+                return broken(line, reason, "rename one of them");
             }
         }
         let mut bones = vec![self.grown(&self.root, None, Vector3::from(self.position))];
         let mut open = self.waiting(ROOT, 0, Vector3::zeros());
         while let Some((line, name, parent, offset)) = open.pop() {
             let Some(draft) = drafts.remove(&name) else {
-                let reason = "stands there already or isn't in :bonedata; repair the hierarchy";
-                return broken(line, format!("bone `{}` {reason}", short(&name)));
+                let name = short(&name);
+                let reason = format!("bone `{name}` is in the hierarchy twice or not in :bonedata");
+                return broken(line, reason, "repair the hierarchy");
             };
             let along = Vector3::from(draft.direction) * draft.length;
             let bone = bones.len();
@@ -214,8 +222,8 @@ impl Reader {
         }
         if let Some(draft) = drafts.values().min_by_key(|draft| draft.line) {
             let name = short(&draft.name);
-            let reason = "hangs on no other in :hierarchy; add it there";
-            return broken(draft.line, format!("bone `{name}` {reason}"));
+            let reason = format!("bone `{name}` has no parent in :hierarchy");
+            return broken(draft.line, reason, "add it there");
         }
         let length = self.length.filter(|length| *length > 0.0);
         Ok(Skeleton {
@@ -270,7 +278,7 @@ fn too_many(line: &Line, bones: usize) -> Result<(), AcclaimError> {
     if bones < MOST_BONES {
         return Ok(());
     }
-    Err(line.broken(format!("more than {MOST_BONES} bones; split the file")))
+    Err(line.broken(format!("more than {MOST_BONES} bones"), "split the file"))
 }
 
 /// An order of axes such as `XYZ`.

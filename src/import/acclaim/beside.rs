@@ -1,44 +1,47 @@
 //! Where the skeleton of a motion is.
 
-use super::AcclaimError;
+use super::error::AcclaimError;
+use crate::import::names::stem;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Largest skeleton that is read, in bytes; those of people have about ten thousand.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// Name and bytes of the skeleton for the motion `file` in `folder`: the `.asf` of its name, or of its name without
-/// what follows a `_` (`01.asf` of `01_02.amc`), or the only one there.
+/// Path and bytes of the skeleton for the motion `file` in `folder`: the `.asf` of its name, or of its name without what
+/// follows a `_` (`01.asf` of `01_02.amc`), or the only one there.
 pub(super) fn skeleton(
     file: &str,
     folder: Option<&Path>,
-) -> Result<(String, Vec<u8>), AcclaimError> {
-    let missing = |reason| AcclaimError::NoSkeleton { reason };
-    let folder = folder.ok_or_else(|| missing(remedy(file, "its .asf isn't at hand")))?;
+) -> Result<(PathBuf, Vec<u8>), AcclaimError> {
+    let missing = |reason: String| AcclaimError::NoSkeleton {
+        reason,
+        wanted: usual_name(file),
+    };
+    let folder = folder.ok_or_else(|| missing("its .asf isn't at hand".to_owned()))?;
     let folder = match folder.as_os_str().is_empty() {
         true => Path::new("."),
         false => folder,
     };
-    let unread = |e: io::Error| missing(remedy(file, &format!("its folder can't be read ({e})")));
+    let unread = |e: io::Error| missing(format!("its folder can't be read ({e})"));
     let skeletons = skeletons(folder).map_err(unread)?;
     let path = belonging(file, &skeletons).ok_or_else(|| {
         missing(match skeletons.len() {
-            0 => remedy(file, "no .asf lies beside it"),
-            many => remedy(
-                file,
-                &format!("none of the {many} .asf beside it has its name"),
-            ),
+            0 => "no .asf is beside it".to_owned(),
+            many => format!("none of the {many} .asf files beside it has its name"),
         })
     })?;
-    let name = super::super::file_name(path);
-    let bytes = bytes(path).map_err(|e| missing(format!("{name} can't be read ({e})")))?;
-    Ok((name, bytes))
+    let bytes =
+        bytes(path).map_err(|e| missing(format!("`{}` can't be read ({e})", path.display())))?;
+    Ok((path.clone(), bytes))
 }
 
-fn remedy(file: &str, reason: &str) -> String {
-    let stem = super::super::stem(file);
+/// The name that the skeleton of `file` should have: the CMU database calls motions by subject and trial, `01_02.amc`, and
+/// skeletons by subject.
+fn usual_name(file: &str) -> String {
+    let stem = stem(file);
     let subject = stem.split_once('_').map_or(stem, |(subject, _)| subject);
-    format!("{reason}; put its skeleton there as {subject}.asf")
+    format!("{subject}.asf")
 }
 
 /// Paths of the folder's `.asf` files, in order.
@@ -56,17 +59,17 @@ fn skeletons(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn belonging<'p>(file: &str, skeletons: &'p [PathBuf]) -> Option<&'p PathBuf> {
-    let mut stem = super::super::stem(file);
+    let mut name = stem(file);
     loop {
         let named = |path: &&PathBuf| {
-            let name = path.file_stem().unwrap_or_default();
-            name.eq_ignore_ascii_case(stem)
+            let stem = path.file_stem().unwrap_or_default();
+            stem.eq_ignore_ascii_case(name)
         };
         if let Some(path) = skeletons.iter().find(named) {
             return Some(path);
         }
-        match stem.rsplit_once('_') {
-            Some((shorter, _)) => stem = shorter,
+        match name.rsplit_once('_') {
+            Some((shorter, _)) => name = shorter,
             None => break,
         }
     }

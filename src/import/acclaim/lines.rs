@@ -1,6 +1,6 @@
 //! Lines of words, as both files have them.
 
-use super::AcclaimError;
+use super::error::AcclaimError;
 use std::str::SplitWhitespace;
 
 /// Numbers beyond this are damage, in the file's units or degrees.
@@ -64,10 +64,11 @@ impl<'a> Line<'a> {
         }
     }
 
-    pub fn broken(&self, reason: String) -> AcclaimError {
+    pub fn broken(&self, reason: String, remedy: &'static str) -> AcclaimError {
         AcclaimError::Broken {
             line: self.number,
             reason,
+            remedy,
         }
     }
 }

@@ -6,40 +6,21 @@
 mod amc;
 mod asf;
 mod beside;
+mod error;
 mod lines;
 
-use super::measure;
+use super::error::NoTakes;
 use super::scene::{Contents, Node, Scene, Take, composed};
-use crate::clip::{Problem, Severity, slerp};
+use super::{measure, names};
+use crate::clip::{Problem, slerp};
 use amc::Motion;
 use asf::{Bone, Freedom, Skeleton};
+use error::AcclaimError;
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
 /// Rate of the CMU motion capture database, Hz: AMC files don't state theirs.
 const USUAL_RATE: f64 = 120.0;
-
-/// Why an ASF or AMC file couldn't be read.
-#[derive(Debug, thiserror::Error)]
-pub enum AcclaimError {
-    #[error("an AMC file is motion without a skeleton, and {reason}")]
-    NoSkeleton { reason: String },
-    #[error("its skeleton {file}: {source}")]
-    Skeleton {
-        file: String,
-        source: Box<AcclaimError>,
-    },
-    #[error("line {line}: `{found}` where {expected} should be; repair that line")]
-    Unexpected {
-        line: usize,
-        found: String,
-        expected: &'static str,
-    },
-    #[error("line {line}: {reason}")]
-    Broken { line: usize, reason: String },
-    #[error("no frames; write the file again")]
-    NoFrames,
-}
 
 /// A skeleton and, from an AMC file, its motion.
 pub(crate) struct AcclaimScene {
@@ -58,23 +39,22 @@ pub(crate) fn read_asf(bytes: &[u8]) -> Result<AcclaimScene, AcclaimError> {
     })
 }
 
-/// Reads the motion in the file called `file`, whose skeleton is looked for in `folder`. `name` becomes the take's name,
-/// since the format has none.
+/// Reads the motion in the file called `file`, whose skeleton is looked for in `folder`. The take gets the file's name, since
+/// the format has none.
 pub(crate) fn read_amc(
     bytes: &[u8],
     file: &str,
-    name: &str,
     folder: Option<&Path>,
 ) -> Result<AcclaimScene, AcclaimError> {
     let (found, skeleton) = beside::skeleton(file, folder)?;
     let bytes_beside = skeleton.len();
     let read = asf::read(&String::from_utf8_lossy(&skeleton));
     let skeleton = read.map_err(|source| AcclaimError::Skeleton {
-        file: found,
+        path: found,
         source: Box::new(source),
     })?;
     let motion = amc::read(&String::from_utf8_lossy(bytes), &skeleton)?;
-    let takes = vec![take(name, &motion)];
+    let takes = vec![take(names::stem(file), &motion)];
     let contents = Contents {
         bytes_beside,
         ..contents("amc", &skeleton, takes)
@@ -93,7 +73,10 @@ fn contents(format: &'static str, skeleton: &Skeleton, takes: Vec<Take>) -> Cont
     Contents {
         unit_m,
         problems: Vec::from_iter(problem),
-        no_takes: "is a skeleton without motion; give one of the .amc files that belong to it",
+        no_takes: NoTakes {
+            cause: "is a skeleton without motion",
+            remedy: "give one of the .amc files that belong to it",
+        },
         ..Contents::new(format, nodes.collect(), takes)
     }
 }
@@ -101,13 +84,12 @@ fn contents(format: &'static str, skeleton: &Skeleton, takes: Vec<Take>) -> Cont
 fn take(name: &str, motion: &Motion) -> Take {
     let mut problems = motion.problems.clone();
     if motion.rate.is_none() {
-        problems.push(Problem {
-            id: "rate-assumed".to_owned(),
-            severity: Severity::Note,
-            message: format!(
-                "the format has no frame rate: {USUAL_RATE} per second are assumed, as in the CMU database; where that is wrong, add a line `:SAMPLES-PER-SECOND` with the right one to the file's head"
+        problems.push(Problem::note(
+            "rate-assumed",
+            format!(
+                "the format has no frame rate: {USUAL_RATE} Hz is assumed, as in the CMU database; where that is wrong, add a line `:SAMPLES-PER-SECOND` with the right rate to the file's head"
             ),
-        });
+        ));
     }
     let fps = motion.rate.unwrap_or(USUAL_RATE);
     Take {

@@ -1,11 +1,11 @@
 //! The tree of joints.
 
-use super::BvhError;
+use super::error::BvhError;
 use super::words::Words;
 use nalgebra::Vector3;
 
 /// Most joints that a file may have, and how deep they may be nested.
-pub(super) const MOST_JOINTS: usize = 1 << 16;
+const MOST_JOINTS: usize = 1 << 16;
 
 /// One number of a frame: along or about an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,10 @@ fn begin(
 ) -> Result<(), BvhError> {
     words.keyword("{")?;
     if joints.len() >= MOST_JOINTS {
-        return Err(BvhError::TooMany { line: words.line });
+        return Err(BvhError::TooMany {
+            line: words.line,
+            most: MOST_JOINTS,
+        });
     }
     joints.push(Joint {
         name,

@@ -3,41 +3,20 @@
 //! There is no standard, so this reads what programs write: channels in any order and on any joint, several roots,
 //! joints without an end site, any line ends and letter case, and rows that disagree with the header's count.
 
+mod error;
 mod hierarchy;
 mod words;
 
 use super::measure::{Scale, rate_of_frame_time};
 use super::scene::{Contents, Node, Scene, Take, composed};
-use crate::clip::{Problem, Severity, slerp};
-use hierarchy::{Channel, Joint, MOST_JOINTS, hierarchy};
+use crate::clip::{Problem, slerp};
+use error::BvhError;
+use hierarchy::{Channel, Joint, hierarchy};
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
 use words::Words;
 
 /// Rate of a file whose frame time can't be used, Hz.
 const USUAL_RATE: f64 = 30.0;
-
-/// Why a BVH file couldn't be read.
-#[derive(Debug, thiserror::Error)]
-pub enum BvhError {
-    #[error("line {line}: {what} is missing; write the file again")]
-    Missing { line: usize, what: &'static str },
-    #[error("line {line}: `{found}` where {expected} should be; repair that line")]
-    Unexpected {
-        line: usize,
-        found: String,
-        expected: &'static str,
-    },
-    #[error(
-        "line {line}: `{found}` is no channel; there are Xposition to Zposition and Xrotation to Zrotation"
-    )]
-    Channel { line: usize, found: String },
-    #[error("line {line}: more than {MOST_JOINTS} joints; split the file")]
-    TooMany { line: usize },
-    #[error("the hierarchy has no channels, so nothing can move; write the file again")]
-    NoChannels,
-    #[error("no frames follow the hierarchy; write the file again")]
-    NoFrames,
-}
 
 /// A BVH file.
 pub(crate) struct BvhScene {
@@ -99,13 +78,12 @@ fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(f64, f64), 
     let word = words.expect("a frame time")?;
     let seconds = words.parsed(word, "a frame time")?;
     let rate = rate_of_frame_time(word, seconds).unwrap_or_else(|| {
-        problems.push(Problem {
-            id: "frame-time".to_owned(),
-            severity: Severity::Warning,
-            message: format!(
-                "a frame time of `{word}` can't be used; {USUAL_RATE} frames per second are assumed, write the right time into the file"
+        problems.push(Problem::warning(
+            "frame-time",
+            format!(
+                "the frame time `{word}` can't be used, so {USUAL_RATE} Hz is assumed; write the right time into the file"
             ),
-        });
+        ));
         USUAL_RATE
     });
     Ok((count, rate))
@@ -123,13 +101,10 @@ fn numbers(
     }
     let over = numbers.len() % width;
     if over > 0 {
-        problems.push(Problem {
-            id: "frame-cut".to_owned(),
-            severity: Severity::Warning,
-            message: format!(
-                "the last frame has {over} of {width} numbers and is left out; the file may be cut"
-            ),
-        });
+        problems.push(Problem::warning(
+            "frame-cut",
+            format!("the last frame has {over} of {width} numbers and is left out; the file may be cut off"),
+        ));
     }
     numbers.truncate(numbers.len() - over);
     match numbers.is_empty() {
@@ -139,10 +114,11 @@ fn numbers(
 }
 
 fn other_count(stated: f64, found: usize) -> Option<Problem> {
-    (stated != found as f64).then(|| Problem {
-        id: "frame-count".to_owned(),
-        severity: Severity::Note,
-        message: format!("the header counts {stated} frames, and {found} follow: those are read"),
+    (stated != found as f64).then(|| {
+        Problem::note(
+            "frame-count",
+            format!("the header counts {stated} frames, but {found} follow: these were read"),
+        )
     })
 }
 

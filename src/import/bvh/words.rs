@@ -1,6 +1,6 @@
 //! Words of a BVH file and the lines that they stand on.
 
-use super::BvhError;
+use super::error::BvhError;
 
 /// Coordinates beyond this are damage, in the file's units or degrees.
 const MOST: f64 = 1e9;

@@ -1,6 +1,6 @@
 //! Arrays of the file, decoded only when asked for and within a budget.
 
-use super::scan::word;
+use super::numbers::{double_word, word};
 use miniz_oxide::inflate::{TINFLStatus, decompress_slice_iter_to_slice};
 use std::borrow::Cow;
 use std::iter::once;
@@ -79,11 +79,6 @@ impl<'a> Array<'a> {
         }
         Ok(self.bytes(budget)?.chunks_exact(4).map(word).collect())
     }
-}
-
-/// Little-endian; missing bytes count as zero.
-fn double_word(bytes: &[u8]) -> u64 {
-    u64::from(word(bytes)) | u64::from(word(bytes.get(4..).unwrap_or(&[]))) << 32
 }
 
 /// Decodes a zlib stream (RFC 1950) that holds exactly `len` bytes.

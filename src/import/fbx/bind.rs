@@ -1,8 +1,9 @@
 //! The bind poses that a file keeps: where its joints were in the world when meshes were bound to them.
 
-use super::document::Element;
 use super::nodes::Tree;
+use super::numbers::in_range;
 use super::objects::Graph;
+use super::record::Element;
 use crate::import::bind::Binds;
 use nalgebra::Matrix4;
 
@@ -37,6 +38,6 @@ fn bind(
         return None;
     }
     let numbers = array.reals(budget).ok()?;
-    let usable = numbers.iter().all(|&x| super::in_range(x));
+    let usable = numbers.iter().all(|&x| in_range(x));
     usable.then(|| (node, Matrix4::from_column_slice(&numbers)))
 }

@@ -1,9 +1,12 @@
 //! ASCII, big-endian and old FBX files, read and evaluated by the C library `ufbx`.
 
+use super::contents::{bound, constraints_left_out, contents};
+use super::error::FbxError;
+use super::numbers::in_range;
 use super::settings::Settings;
 use super::takes::{first_sane, rate, span_problems};
 use super::transform::{Inherit, Local, Property, World};
-use super::{FbxError, bound, constraints_left_out, contents};
+use crate::explain::Explanation;
 use crate::import::bind::Binds;
 use crate::import::scene::{Contents, Node, Scene, Take};
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
@@ -189,9 +192,13 @@ fn take(
             }
         }
         None => Take {
-            fault: Some(format!(
-                "take `{name}` has {layers} layers and their keys for {} nodes, more than can be evaluated; merge its layers",
-                places.len()
+            fault: Some(Box::new(
+                Explanation::input(format!(
+                    "its {layers} layers and their keys for {} nodes are more than can be evaluated",
+                    places.len()
+                ))
+                .place(format!("take `{name}`"))
+                .remedy("merge its layers"),
             )),
             ..Take::still(name)
         },
@@ -252,7 +259,7 @@ fn binds(scene: &ufbx::Scene, nodes: &[Node], places: &[Option<usize>]) -> Vec<B
             m.m20, m.m21, m.m22, m.m23,
             0.0, 0.0, 0.0, 1.0,
         );
-        let usable = matrix.iter().all(|&x| super::in_range(x));
+        let usable = matrix.iter().all(|&x| in_range(x));
         (nodes[place].is_bone && usable).then_some((place, matrix))
     };
     poses

@@ -1,8 +1,8 @@
 //! The binary container: nested records with typed values, borrowed from the file's bytes.
 
-use super::FbxError;
-use super::array::Array;
-use super::scan::{broken, readable};
+use super::error::{FbxError, broken};
+use super::record::Element;
+use super::scan::readable;
 use super::tape::Tape;
 use fbxcel::low::FbxHeader;
 
@@ -11,22 +11,6 @@ const MAGIC: &[u8] = b"Kaydara FBX Binary  \0";
 const HEADER_LEN: usize = 27;
 /// First version with 64-bit record headers.
 const WIDE_VERSION: u32 = 7500;
-
-/// A record: a name, values and nested records.
-#[derive(Debug)]
-pub(super) struct Element<'a> {
-    pub name: &'a [u8],
-    pub values: Vec<Value<'a>>,
-    pub children: Vec<Element<'a>>,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Value<'a> {
-    Int(i64),
-    Real(f64),
-    Text(&'a [u8]),
-    Array(Array<'a>),
-}
 
 /// A parsed file.
 #[derive(Debug)]
@@ -85,57 +69,10 @@ pub(crate) fn is_ascii(bytes: &[u8]) -> bool {
     !head.contains(&0) && (head.starts_with(b"; FBX") || has(b"FBXHeaderExtension:"))
 }
 
-impl<'a> Element<'a> {
-    pub fn child(&self, name: &str) -> Option<&Element<'a>> {
-        self.children
-            .iter()
-            .find(|child| child.name == name.as_bytes())
-    }
-
-    pub fn int(&self, index: usize) -> Option<i64> {
-        self.values.get(index).and_then(Value::int)
-    }
-
-    pub fn text(&self, index: usize) -> Option<&'a [u8]> {
-        match self.values.get(index) {
-            Some(&Value::Text(text)) => Some(text),
-            _ => None,
-        }
-    }
-
-    /// The array that is the first value of the child `name`.
-    pub fn array(&self, name: &str) -> Option<Array<'a>> {
-        match self.child(name)?.values.first() {
-            Some(&Value::Array(array)) => Some(array),
-            _ => None,
-        }
-    }
-}
-
-impl Value<'_> {
-    /// Reals are cut off towards zero, as exporters write some enumerations as reals.
-    pub fn int(&self) -> Option<i64> {
-        match *self {
-            Value::Int(value) => Some(value),
-            Value::Real(value) if value.is_finite() => Some(value as i64),
-            _ => None,
-        }
-    }
-
-    /// Only values that later arithmetic can't overflow.
-    pub fn real(&self) -> Option<f64> {
-        match *self {
-            Value::Int(value) => Some(value as f64),
-            Value::Real(value) if super::in_range(value) => Some(value),
-            _ => None,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::FbxError;
-    use super::{Document, Value};
+    use super::super::record::Value;
+    use super::{Document, FbxError};
 
     /// A file of one record, as the format lays it out; `tail` stands between its values and its end.
     fn file(version: u32, name: &[u8], values: &[&[u8]], tail: &[u8]) -> Vec<u8> {

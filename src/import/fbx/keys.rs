@@ -1,8 +1,8 @@
 //! Keys of animation curves, from the file's arrays.
 
 use super::array::Array;
-use super::curve::{Beyond, Handle, Key, Segment, arriving_slope};
-use super::document::Element;
+use super::key::{Beyond, Handle, Key, Segment, arriving_slope};
+use super::record::Element;
 use super::tangent::{Attribute, Step, TANGENT_USER, slopes};
 use std::iter::repeat_n;
 

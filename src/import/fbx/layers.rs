@@ -1,7 +1,7 @@
 //! Layers of a take: which curves drive which properties, and how layers blend.
 
-use super::FbxError;
 use super::curve::Curve;
+use super::error::FbxError;
 use super::nodes::{Rig, Tree};
 use super::objects::{Graph, Object};
 use super::properties::{Properties, Templates};
@@ -42,7 +42,7 @@ impl BadCurve {
             take: take.into(),
             driven,
             id: self.id,
-            reason: self.reason.into(),
+            reason: self.reason,
         }
     }
 }

@@ -4,13 +4,18 @@ mod array;
 mod bind;
 #[cfg(feature = "ufbx")]
 mod by_ufbx;
+mod contents;
 mod curve;
 mod document;
+mod error;
+mod key;
 mod keys;
 mod layers;
 mod nodes;
+mod numbers;
 mod objects;
 mod properties;
+mod record;
 mod scan;
 mod settings;
 mod takes;
@@ -31,12 +36,14 @@ mod rewritten;
 #[cfg(test)]
 mod synthetic;
 
-use crate::clip::{Problem, Severity};
-use crate::import::bind::{Binds, Stand, pose};
-use crate::import::scene::{Contents, Node, Scene, Take};
+use crate::clip::Problem;
+use crate::explain::Explain;
+use crate::import::scene::{Contents, Scene, Take};
+use contents::{bound, constraints_left_out, contents};
 use curve::Curve;
 use document::Document;
 pub(crate) use document::is_ascii;
+use error::FbxError;
 use layers::{Animation, Curves};
 use nalgebra::Matrix4;
 use nodes::{Rig, Tree};
@@ -45,42 +52,6 @@ use properties::Templates;
 use settings::Settings;
 use takes::Stated;
 use transform::World;
-
-/// Why a file can't be read as FBX.
-#[derive(Debug, thiserror::Error)]
-pub enum FbxError {
-    #[error("not an FBX file; check that it was downloaded whole, and what wrote it")]
-    NotFbx,
-    #[error(
-        "this build, without the feature `ufbx`, can't read ASCII FBX; save as binary FBX 7.4 or newer"
-    )]
-    Ascii,
-    #[error(
-        "this build, without the feature `ufbx`, can't read big-endian FBX; save as binary FBX 7.4 or newer"
-    )]
-    BigEndian,
-    #[error(
-        "this build, without the feature `ufbx`, can't read FBX version {found}; save as binary FBX 7.4 or 7.5"
-    )]
-    Version { found: u32 },
-    #[error("ufbx can't read it ({reason}); export it again, best as binary FBX 7.4 or newer")]
-    Ufbx { reason: String },
-    #[error("broken FBX at {place}: {reason}; export or download it again")]
-    Broken { place: String, reason: String },
-    #[error("take `{take}`, {driven}, animation curve {id}: {reason}; export or download it again")]
-    Curve {
-        take: String,
-        /// The joint or weight that the curve drives.
-        driven: String,
-        id: i64,
-        reason: String,
-    },
-}
-
-/// Whether a number of the file is finite and small enough for arithmetic with it to stay so.
-fn in_range(value: f64) -> bool {
-    value.abs() < 1e12
-}
 
 /// A parsed FBX file.
 pub(crate) struct FbxScene {
@@ -119,7 +90,9 @@ fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
         let read = Animation::read(&graph, stack, &templates, &tree, &mut curves);
         let (animation, fault) = match read {
             Ok(animation) => (animation, None),
-            Err(fault @ FbxError::Curve { .. }) => (Animation::default(), Some(fault.to_string())),
+            Err(fault @ FbxError::Curve { .. }) => {
+                (Animation::default(), Some(Box::new(fault.explain())))
+            }
             Err(error) => return Err(error),
         };
         let object = &graph.objects[stack];
@@ -150,64 +123,18 @@ fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     Ok(scene)
 }
 
-/// What a file of these settings holds.
-fn contents(
-    settings: Settings,
-    nodes: Vec<Node>,
-    takes: Vec<Take>,
-    more_problems: Vec<Problem>,
-) -> Contents {
-    let mut problems = settings.problems;
-    problems.extend(more_problems);
-    Contents {
-        up_axis: settings.up_axis,
-        unit_m: settings.unit_m,
-        canonical_from_file: settings.canonical_from_file,
-        problems,
-        ..Contents::new("fbx", nodes, takes)
-    }
-}
-
-/// Takes a bind pose as the rest pose of a scene whose nodes stand in another. A root keeps its heading: bind poses are
-/// often kept in the axes of the tool that the character was modelled in.
-fn bound<S: Scene>(scene: &S, binds: Vec<Binds>) -> Option<(Vec<Matrix4<f64>>, Problem)> {
-    if binds.is_empty() {
-        return None;
-    }
-    let contents = scene.contents();
-    let stand = Stand {
-        nodes: &contents.nodes,
-        world: &scene.placed(None),
-        up: Some(contents.canonical_from_file.row(2).transpose()),
-    };
-    pose(&stand, binds.into_iter())
-}
-
-fn warning(id: &str, message: &str) -> Problem {
-    Problem {
-        id: id.into(),
-        severity: Severity::Warning,
-        message: message.into(),
-    }
-}
-
 fn graph_problems(graph: &Graph, tree: &Tree) -> Vec<Problem> {
     let mut problems = Vec::new();
     if tree.circular {
-        problems.push(warning(
+        problems.push(Problem::warning(
             "circular-nodes",
-            "some nodes are their own ancestors; the circle was cut",
+            "some nodes are their own ancestors: the circle was cut",
         ));
     }
     if graph.of_class("Constraint").next().is_some() {
         problems.push(constraints_left_out());
     }
     problems
-}
-
-fn constraints_left_out() -> Problem {
-    let message = "constraints aren't evaluated; bake the animation before exporting if the motion looks wrong";
-    warning("constraints-left-out", message)
 }
 
 impl Scene for FbxScene {

@@ -1,6 +1,7 @@
 //! Objects of the file and the graph that connects them.
 
-use super::document::{Document, Element, Value};
+use super::document::Document;
+use super::record::{Element, Value};
 use std::collections::BTreeMap;
 
 pub(super) struct Object<'d, 'a> {

@@ -1,6 +1,7 @@
 //! Properties of objects, with the defaults that the file's templates state.
 
-use super::document::{Document, Element, Value};
+use super::document::Document;
+use super::record::{Element, Value};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 

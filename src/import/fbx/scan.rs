@@ -1,12 +1,15 @@
-//! Checks before `fbxcel` reads a file, and the few bytes that it must see changed.
+//! Checks every length of a file, and makes the copy of its bytes that `fbxcel` reads.
 //!
-//! `fbxcel` trusts the file's lengths: it adds them unchecked, follows values beyond their record, nests as deep as the
-//! file says and opens a decoder on compressed arrays that are shorter than what the decoder reads first. So every
-//! length is checked here against the record that holds it.
+//! Why it is needed: `fbxcel` 0.9 trusts the file. It adds a record's lengths unchecked; it reads as many values as the record
+//! announces, also beyond the record's end, and then panics ("Attempt to skip backward"); and it nests as deep as the file
+//! says. It hands every compressed array to a zlib decoder, which takes its header from the bytes behind an array that is
+//! shorter than that. And it refuses a whole file for one name that isn't UTF-8, or one value of the types `B`, `Z` and
+//! `c`, all of which exporters write.
 
-use super::FbxError;
+use super::error::{FbxError, broken};
+use super::numbers::word;
 
-/// Real files nest about eight records deep.
+/// Deepest nesting of records. Chosen: real files nest about eight deep, and dropping the records is recursive.
 const MAX_DEPTH: usize = 64;
 /// Count, encoding and byte length of an array.
 pub(super) const ARRAY_HEADER: usize = 12;
@@ -24,22 +27,6 @@ pub(super) fn readable(bytes: &[u8], start: usize, wide: bool) -> Result<Vec<u8>
     };
     scan.list(start, bytes.len(), 0)?;
     Ok(scan.copy)
-}
-
-pub(super) fn broken(at: usize, reason: &str) -> FbxError {
-    FbxError::Broken {
-        place: format!("byte {at}"),
-        reason: reason.into(),
-    }
-}
-
-/// Little-endian; missing bytes count as zero.
-pub(super) fn word(bytes: &[u8]) -> u32 {
-    bytes
-        .iter()
-        .take(4)
-        .rev()
-        .fold(0, |n, &byte| n << 8 | u32::from(byte))
 }
 
 struct Scan<'a> {

@@ -2,7 +2,7 @@
 
 use super::document::Document;
 use super::properties::Properties;
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use nalgebra::{Matrix3, Vector3};
 
 /// Ticks per second of FBX 7.
@@ -68,18 +68,18 @@ impl Settings {
         let axis = |name: &str| signed_axis(int(name)?, int(&format!("{name}Sign")));
         let axes = Axes::new(axis("UpAxis"), axis("FrontAxis"), axis("CoordAxis"));
         if axes.canonical_from_file().determinant() < 0.0 {
-            problems.push(warning(
+            problems.push(Problem::warning(
                 "left-handed",
-                "the file's axes are left-handed: the motion is mirrored to match",
+                "the file's axes are left-handed: the motion was mirrored to fit right-handed ones",
             ));
         }
         let unit = real("UnitScaleFactor").unwrap_or(1.0);
         let unit = if (1e-9..=1e9).contains(&unit) {
             unit
         } else {
-            problems.push(warning(
+            problems.push(Problem::warning(
                 "invalid-unit",
-                "the file's unit is out of range: centimetres are assumed",
+                "the file's unit of length is out of range: centimetres are assumed",
             ));
             1.0
         };
@@ -91,14 +91,6 @@ impl Settings {
             ticks,
             problems,
         }
-    }
-}
-
-fn warning(id: &str, message: &str) -> Problem {
-    Problem {
-        id: id.into(),
-        severity: Severity::Warning,
-        message: message.into(),
     }
 }
 

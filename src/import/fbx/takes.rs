@@ -1,10 +1,11 @@
 //! Takes: their time span, frame rate, and what they move.
 
 use super::curve::Curve;
-use super::document::{Document, Element};
+use super::document::Document;
 use super::layers::Animation;
 use super::properties::Properties;
-use crate::clip::{Problem, Severity};
+use super::record::Element;
+use crate::clip::Problem;
 use crate::import::scene::Take;
 use std::collections::BTreeMap;
 
@@ -165,9 +166,9 @@ fn spacing_fps(spacings: impl Iterator<Item = f64>, ticks: f64) -> Option<f64> {
 fn problems(take: &Take, animation: &Animation, curves: &[Curve]) -> Vec<Problem> {
     let mut problems = Vec::new();
     if all_curves(animation, curves).any(|curve| curve.mended) {
-        problems.push(super::warning(
+        problems.push(Problem::warning(
             "mended-curves",
-            &format!(
+            format!(
                 "take `{}` has curves with keys out of order or without a finite value",
                 take.name
             ),
@@ -176,30 +177,22 @@ fn problems(take: &Take, animation: &Animation, curves: &[Curve]) -> Vec<Problem
     if animation.silent() > 0 {
         let (silent, name) = (animation.silent(), &take.name);
         let message = format!("take `{name}` has {silent} muted layers, which are left out");
-        problems.push(note("muted-layers", message));
+        problems.push(Problem::note("muted-layers", message));
     }
     problems
-}
-
-fn note(id: &str, message: String) -> Problem {
-    Problem {
-        id: id.into(),
-        severity: Severity::Note,
-        message,
-    }
 }
 
 /// What should be known of a take's span. `keyed` is that of its keys, in seconds.
 pub(super) fn span_problems(take: &Take, keyed: Option<(f64, f64)>) -> Vec<Problem> {
     let mut problems = Vec::new();
-    let mut note = |id, message| problems.push(note(id, message));
+    let mut note = |id, message: String| problems.push(Problem::note(id, message));
     if take.animated.is_empty() {
         note("empty-take", format!("take `{}` moves nothing", take.name));
     }
     if take.end - take.start == MAX_SECONDS {
         note(
             "cut-take",
-            format!("take `{}` is cut to its first six hours", take.name),
+            format!("take `{}` was cut to its first six hours", take.name),
         );
     } else if let Some((first, last)) = keyed {
         let frame = 1.0 / take.fps;
@@ -207,7 +200,7 @@ pub(super) fn span_problems(take: &Take, keyed: Option<(f64, f64)>) -> Vec<Probl
             note(
                 "keys-outside-take",
                 format!(
-                    "take `{}` spans {:.3} to {:.3} s and its keys {first:.3} to {last:.3} s; only its span is used",
+                    "take `{}` lasts from {:.3} to {:.3} s and its keys from {first:.3} to {last:.3} s: keys outside the take are left out",
                     take.name, take.start, take.end
                 ),
             );

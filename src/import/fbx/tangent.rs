@@ -1,5 +1,7 @@
 //! Slopes of cubic keys: automatic, TCB, and set by the user.
 
+use super::numbers::in_range;
+
 const TANGENT_TCB: u32 = 0x200;
 pub(super) const TANGENT_USER: u32 = 0x400;
 const CLAMP: u32 = 0x1000;
@@ -25,7 +27,7 @@ impl Attribute {
 
     fn real(&self, index: usize) -> f64 {
         let value = f64::from(f32::from_bits(self.data[index & 3]));
-        if super::in_range(value) { value } else { 0.0 }
+        if in_range(value) { value } else { 0.0 }
     }
 
     /// Weights are two 16-bit counts of 1/10000 in the third value.

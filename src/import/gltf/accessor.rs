@@ -1,8 +1,8 @@
 //! Numbers out of a glTF file's buffers. Every index, offset, stride and count is checked against the bytes there are.
 
-use super::GltfError;
 use super::buffer::Buffers;
 use super::document::{Document, size};
+use super::error::{Fault, GltfError};
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Index, buffer::View};
@@ -69,16 +69,18 @@ impl<'a> Accessors<'a> {
         wanted: Type,
     ) -> Result<Rc<[f64]>, GltfError> {
         let accessor = accessor.value();
-        let broken = |reason: String| GltfError::Accessor { accessor, reason };
+        let broken = |fault: Fault| GltfError::Accessor { accessor, fault };
         let about = self.document.accessors.get(accessor);
-        let about = about.ok_or_else(|| broken("the file has no such accessor".to_owned()))?;
+        let about = about.ok_or_else(|| broken("the file has no such accessor".into()))?;
         if about.type_ != Checked::Valid(wanted) {
             let kind = match about.type_ {
                 Checked::Valid(kind) => format!("{kind:?}").to_uppercase(),
                 Checked::Invalid => "of an unknown type".to_owned(),
             };
             let wanted = format!("{wanted:?}").to_uppercase();
-            return Err(broken(format!("it is {kind} where {wanted} is wanted")));
+            return Err(broken(
+                format!("it is {kind} where {wanted} is wanted").into(),
+            ));
         }
         let numbers = match self.done.get(&accessor) {
             Some(done) => done.clone(),
@@ -90,29 +92,27 @@ impl<'a> Accessors<'a> {
         self.done.insert(accessor, numbers.clone());
         self.given = self.given.saturating_add(numbers.len());
         if self.given > MOST_GIVEN {
-            return Err(broken("it is shared implausibly often".to_owned()));
+            return Err(broken("it is shared implausibly often".into()));
         }
         Ok(numbers)
     }
 
     /// Counts numbers that are about to be held.
-    fn hold(&mut self, numbers: usize) -> Result<(), String> {
+    fn hold(&mut self, numbers: usize) -> Result<(), Fault> {
         self.numbers = self.numbers.saturating_add(numbers);
         let most = self.buffers.bytes().saturating_mul(NUMBERS_PER_BYTE);
         let most = most.saturating_add(FREE_NUMBERS);
         if self.numbers > most {
-            return Err(format!(
-                "with it the file asks for more than {most} numbers"
-            ));
+            return Err(format!("with it the file asks for more than {most} numbers").into());
         }
         Ok(())
     }
 
-    fn numbers(&mut self, about: &Accessor, width: usize) -> Result<Vec<f64>, String> {
+    fn numbers(&mut self, about: &Accessor, width: usize) -> Result<Vec<f64>, Fault> {
         let count = size(about.count);
         let length = count.checked_mul(width).ok_or("too many elements")?;
         let Checked::Valid(component) = about.component_type else {
-            return Err("unknown component type".to_owned());
+            return Err("unknown component type".into());
         };
         let layout = |view: Index<View>, offset: USize64, count| Layout {
             view: view.value(),
@@ -134,10 +134,10 @@ impl<'a> Accessors<'a> {
         if let Some(sparse) = &about.sparse {
             let (some, indices, values) = (size(sparse.count), &sparse.indices, &sparse.values);
             if some > count {
-                return Err(format!("{some} sparse values for {count} elements"));
+                return Err(format!("{some} sparse values for {count} elements").into());
             }
             let Checked::Valid(kind) = indices.component_type else {
-                return Err("unknown component type of its sparse indices".to_owned());
+                return Err("unknown component type of its sparse indices".into());
             };
             let indices = self.elements(&Layout {
                 width: 1,
@@ -152,20 +152,21 @@ impl<'a> Accessors<'a> {
     }
 
     /// The elements that `layout` describes, provided that all of them lie in the view and the view in its buffer.
-    fn elements(&mut self, layout: &Layout) -> Result<Vec<f64>, String> {
+    fn elements(&mut self, layout: &Layout) -> Result<Vec<f64>, Fault> {
         let view = self.document.buffer_views.get(layout.view);
         let view = view.ok_or_else(|| format!("no buffer view {}", layout.view))?;
         if let Some(name) = self.document.packing(layout.view) {
-            return Err(format!(
-                "it is packed with {name}; unpack it, with gltfpack or gltf-transform"
+            return Err(Fault::new(
+                format!("it is packed with {name}"),
+                "unpack it, with gltfpack or gltf-transform",
             ));
         }
         let length = layout.count.checked_mul(layout.width);
         let length = length.ok_or("too many elements")?;
         let buffer = view.buffer.value();
-        self.buffers.get(buffer).map_err(|e| e.to_string())?;
+        self.buffers.get(buffer)?;
         self.hold(length)?;
-        let bytes = self.buffers.get(buffer).map_err(|e| e.to_string())?;
+        let bytes = self.buffers.get(buffer)?;
         let start = size(view.byte_offset.unwrap_or_default());
         let end = start.checked_add(size(view.byte_length));
         let bytes = end
@@ -178,15 +179,13 @@ impl<'a> Accessors<'a> {
             .filter(|&stride| stride > 0)
             .unwrap_or(size);
         if stride < size {
-            return Err(format!("elements of {size} bytes stand {stride} apart"));
+            return Err(format!("elements of {size} bytes are only {stride} bytes apart").into());
         }
         let last = layout.count.saturating_sub(1).checked_mul(stride);
         let end = last.and_then(|last| last.checked_add(size)?.checked_add(layout.offset));
         if layout.count > 0 && end.is_none_or(|end| end > bytes.len()) {
-            return Err(format!(
-                "{} elements don't fit buffer view {}",
-                layout.count, layout.view
-            ));
+            let (count, view) = (layout.count, layout.view);
+            return Err(format!("{count} elements don't fit buffer view {view}").into());
         }
         let mut numbers = Vec::with_capacity(length);
         for element in 0..layout.count {
@@ -205,7 +204,7 @@ fn overwrite(
     width: usize,
     indices: &[f64],
     values: &[f64],
-) -> Result<(), String> {
+) -> Result<(), Fault> {
     for (index, value) in indices.iter().zip(values.chunks_exact(width)) {
         let at = (*index as usize)
             .checked_mul(width)

@@ -1,7 +1,7 @@
 //! The bytes behind a glTF file's buffers.
 
-use super::GltfError;
 use super::document::Document;
+use super::error::Fault;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -35,11 +35,12 @@ impl<'a> Buffers<'a> {
     }
 
     /// The bytes of buffer `buffer`.
-    pub fn get(&mut self, buffer: usize) -> Result<&[u8], GltfError> {
+    pub fn get(&mut self, buffer: usize) -> Result<&[u8], Fault> {
         if !self.fetched.contains_key(&buffer) {
-            let bytes = self
-                .fetch(buffer)
-                .map_err(|reason| GltfError::Buffer { buffer, reason })?;
+            let bytes = self.fetch(buffer).map_err(|fault| Fault {
+                cause: format!("buffer {buffer}: {}", fault.cause),
+                ..fault
+            })?;
             self.bytes = self.bytes.saturating_add(bytes.len());
             self.fetched.insert(buffer, bytes);
         }
@@ -56,15 +57,15 @@ impl<'a> Buffers<'a> {
         self.bytes_beside
     }
 
-    fn fetch(&mut self, buffer: usize) -> Result<Cow<'a, [u8]>, String> {
+    fn fetch(&mut self, buffer: usize) -> Result<Cow<'a, [u8]>, Fault> {
         let about = self.document.buffers.get(buffer);
-        let about = about.ok_or("the file has no such buffer; export it again")?;
+        let about = about.ok_or("the file has no such buffer")?;
         match about.uri.as_deref() {
             None if buffer == 0 => self
                 .bin
                 .map(Cow::Borrowed)
-                .ok_or("it has no bytes; export the file again".to_owned()),
-            None => Err("it has no address; export the file again".to_owned()),
+                .ok_or_else(|| "it has no bytes".into()),
+            None => Err("it has no address".into()),
             Some(uri) => match uri.split_once(':') {
                 Some((scheme, data)) if scheme.eq_ignore_ascii_case("data") => {
                     data_uri(data).map(Cow::Owned)
@@ -75,26 +76,29 @@ impl<'a> Buffers<'a> {
     }
 
     /// Reads a file from the folder of the glTF file.
-    fn read_beside(&mut self, uri: &str) -> Result<Vec<u8>, String> {
-        let folder = self
-            .folder
-            .ok_or("it lies in another file, which isn't at hand; put both into one folder, or save as GLB")?;
+    fn read_beside(&mut self, uri: &str) -> Result<Vec<u8>, Fault> {
+        let folder = self.folder.ok_or_else(|| {
+            Fault::new(
+                "it lies in another file, which isn't at hand",
+                "put both into one folder, or save as GLB",
+            )
+        })?;
         let folder = if folder.as_os_str().is_empty() {
             Path::new(".")
         } else {
             folder
         };
         let path = inside(folder, uri)?;
-        let missing =
-            |e: std::io::Error| format!("`{uri}` can't be read ({e}); put it beside the file");
+        let missing = |e| missing(uri, &e);
         let about = std::fs::metadata(&path).map_err(missing)?;
         if !about.is_file() {
-            return Err(format!("`{uri}` isn't a file"));
+            return Err(format!("`{uri}` isn't a file").into());
         }
         self.external_bytes = self.external_bytes.saturating_add(about.len());
         if self.external_bytes > MOST_BYTES {
-            return Err(format!(
-                "the file's buffers are larger than {MOST_BYTES} bytes; split the file"
+            return Err(Fault::new(
+                format!("the file's buffers are larger than {MOST_BYTES} bytes"),
+                "split the file",
             ));
         }
         let bytes = std::fs::read(&path).map_err(missing)?;
@@ -103,17 +107,28 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// The path of `uri` in `folder`, unless it leads out of it, by its words or by a link.
-fn inside(folder: &Path, uri: &str) -> Result<PathBuf, String> {
-    let outside = || format!("`{uri}` lies outside the file's folder; put it beside the file");
+fn missing(uri: &str, error: &std::io::Error) -> Fault {
+    Fault::new(
+        format!("`{uri}` can't be read ({error})"),
+        "put it beside the file",
+    )
+}
+
+/// The path of `uri` in `folder`, unless it leads out of the folder, by its words or by a link.
+fn inside(folder: &Path, uri: &str) -> Result<PathBuf, Fault> {
+    let outside = || {
+        Fault::new(
+            format!("`{uri}` lies outside the file's folder"),
+            "put it beside the file",
+        )
+    };
     let (name, _) = percent_decoded(uri);
     let name = String::from_utf8_lossy(&name);
     let plain = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
     if name.contains([':', '\\', '\0']) || !Path::new(&*name).components().all(plain) {
         return Err(outside());
     }
-    let missing =
-        |e: std::io::Error| format!("`{uri}` can't be read ({e}); put it beside the file");
+    let missing = |e| missing(uri, &e);
     let folder = folder.canonicalize().map_err(missing)?;
     let path = folder.join(&*name).canonicalize().map_err(missing)?;
     if path.starts_with(&folder) {
@@ -150,9 +165,9 @@ fn percent_decoded(text: &str) -> (Vec<u8>, bool) {
 }
 
 /// The bytes of a data URI (RFC 2397), given what follows `data:`.
-fn data_uri(data: &str) -> Result<Vec<u8>, String> {
+fn data_uri(data: &str) -> Result<Vec<u8>, Fault> {
     const BASE64: &str = ";base64";
-    let broken = |reason: &str| format!("its data URI {reason}; export the file again");
+    let broken = |reason: &str| Fault::from(format!("its data URI {reason}"));
     let (kind, body) = data
         .split_once(',')
         .ok_or_else(|| broken("has no comma, and so no data"))?;
@@ -231,7 +246,7 @@ mod tests {
 
     #[test]
     fn data_uris_hold_base64_or_percent_codes() {
-        let bytes = |data: &str| data_uri(data).unwrap_or_else(|e| panic!("{data}: {e}"));
+        let bytes = |data: &str| data_uri(data).unwrap_or_else(|e| panic!("{data}: {e:?}"));
         assert_eq!(bytes(",A%20brief%20note"), b"A brief note");
         assert_eq!(bytes("application/octet-stream,%00%fF+a"), b"\0\xff+a");
         assert_eq!(bytes(";BASE64,Zm9v"), b"foo");
@@ -246,11 +261,8 @@ mod tests {
             (";base64,!", "broken base64"),
             (",ä", "must be written"),
         ] {
-            let found = data_uri(data).expect_err(data);
-            assert!(
-                found.contains(reason) && found.contains("export"),
-                "{data}: {found}"
-            );
+            let found = data_uri(data).expect_err(data).cause;
+            assert!(found.contains(reason), "{data}: {found}");
         }
     }
 
@@ -272,8 +284,8 @@ mod tests {
             "..\\secret.bin",
             secret,
         ] {
-            let reason = inside(&folder, uri).expect_err("refused");
-            assert!(reason.contains("outside"), "{uri}: {reason}");
+            let fault = inside(&folder, uri).expect_err("refused");
+            assert!(fault.cause.contains("outside"), "{uri}: {fault:?}");
         }
         assert!(inside(&folder, "none.bin").is_err());
     }
@@ -290,6 +302,7 @@ mod tests {
         assert!(
             inside(&folder, "link.bin")
                 .expect_err("refused")
+                .cause
                 .contains("outside")
         );
     }

@@ -1,6 +1,6 @@
 //! The GLB container: a header, a JSON chunk and perhaps a binary chunk.
 
-use super::GltfError;
+use super::error::GltfError;
 use gltf::Glb;
 use gltf::binary::Error;
 
@@ -13,10 +13,12 @@ pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, GltfError> {
     let length = length.map(|word| u32::from_le_bytes(*word));
     // `Glb` subtracts the header from the length unchecked.
     if length.is_none_or(|length| length < HEADER) {
-        return Err(GltfError::Container("the GLB header is cut off".to_owned()));
+        return Err(broken("the GLB header is cut off".to_owned()));
     }
     Glb::from_slice(bytes).map_err(|e| match e {
-        gltf::Error::Binary(Error::Version(version)) => GltfError::Version(version.to_string()),
+        gltf::Error::Binary(Error::Version(version)) => GltfError::Version {
+            found: version.to_string(),
+        },
         gltf::Error::Binary(
             Error::Length {
                 length,
@@ -27,9 +29,13 @@ pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, GltfError> {
                 length_read,
                 ..
             },
-        ) => GltfError::Container(format!(
+        ) => broken(format!(
             "the GLB announces {length} bytes, but {length_read} are left"
         )),
-        other => GltfError::Container(format!("broken GLB ({other})")),
+        other => broken(format!("broken GLB ({other})")),
     })
+}
+
+fn broken(reason: String) -> GltfError {
+    GltfError::Container { reason }
 }

@@ -3,7 +3,7 @@
 //! Everything else (meshes, materials, textures) is left unread, so that faults there can't keep the motion from
 //! being imported. Its entries are those of [`gltf::json`], which checks their kinds but no index.
 
-use super::GltfError;
+use super::error::GltfError;
 use gltf::json::animation::{Property, Sampler};
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Accessor, Buffer, Index, Node, Skin, buffer};
@@ -221,14 +221,19 @@ struct Asset {
 /// Reads the JSON, whose version is looked at first: glTF 1 has another layout.
 pub(super) fn parse(json: &[u8]) -> Result<Document, GltfError> {
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-    let stamp: Stamp = serde_json::from_slice(json).map_err(GltfError::Json)?;
+    let broken = |e: serde_json::Error| GltfError::Json {
+        reason: e.to_string(),
+    };
+    let stamp: Stamp = serde_json::from_slice(json).map_err(broken)?;
     if !stamp.asset.version.starts_with("2.") {
-        return Err(GltfError::Version(stamp.asset.version));
+        return Err(GltfError::Version {
+            found: stamp.asset.version,
+        });
     }
     let document: Document = serde_json::from_slice(json)
         .or_else(|e| serde_json::from_slice(&without_extras(json)).map_err(|_| e))
-        .map_err(GltfError::Json)?;
-    let extended = serde_json::from_slice(json).map_err(GltfError::Json)?;
+        .map_err(broken)?;
+    let extended = serde_json::from_slice(json).map_err(broken)?;
     let extending = serde_json::from_slice(json).ok();
     Ok(Document {
         extended,

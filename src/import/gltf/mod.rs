@@ -11,14 +11,13 @@ mod rate;
 mod take;
 mod tree;
 
-pub use error::GltfError;
-
 use super::scene::{Contents, Scene, composed};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use crate::import::bind::{Stand, pose};
 use accessor::Accessors;
 use buffer::Buffers;
 use document::Document;
+use error::GltfError;
 use nalgebra::Matrix4;
 use std::path::Path;
 use take::Curves;
@@ -96,22 +95,21 @@ fn scene(
 
 fn extension_problems(document: &Document) -> Vec<Problem> {
     let unknown = |name: &&String| !HARMLESS.iter().any(|harmless| name.starts_with(harmless));
-    let problem = |name: &String| Problem {
-        id: "extension-ignored".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "the file requires {name}, of which only plain nodes and animations are used"
-        ),
+    let problem = |name: &String| {
+        Problem::note(
+            "extension-ignored",
+            format!(
+                "the file requires {name}, which isn't known: its plain nodes and animations were read"
+            ),
+        )
     };
     let required = document.extensions_required.iter();
     let mut problems: Vec<Problem> = required.filter(unknown).map(problem).collect();
     if document.extensions.is_none() {
-        problems.push(Problem {
-            id: "extension-unreadable".to_owned(),
-            severity: Severity::Note,
-            message: "the bones that the file's VRM extension names can't be read; the joints are told from skins and motion"
-                .to_owned(),
-        });
+        problems.push(Problem::note(
+            "extension-unreadable",
+            "the bones that the file's VRM extension names can't be read; skins and motion decide what a joint is",
+        ));
     }
     problems
 }

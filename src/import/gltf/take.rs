@@ -1,12 +1,13 @@
 //! One animation of a glTF file: the curves that move its nodes.
 
-use super::GltfError;
 use super::accessor::Accessors;
 use super::curve::Curve;
 use super::document::Animation;
+use super::error::GltfError;
 use super::rate;
 use super::tree::{Placement, Tree};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
+use crate::explain::{Explain, Explanation};
 use crate::import::scene::Take;
 use gltf::json::accessor::Type;
 use gltf::json::animation::{Interpolation, Property, Sampler};
@@ -96,8 +97,7 @@ pub(super) fn read(
     let mut problems = Vec::new();
     let (curves, fault) = match curves(animation, &name, tree, accessors, &mut problems) {
         Ok(curves) => (curves, None),
-        Err(e @ GltfError::Curve { .. }) => (Curves::default(), Some(e.to_string())),
-        Err(e) => (Curves::default(), Some(format!("take `{name}`: {e}"))),
+        Err(e) => (Curves::default(), Some(Box::new(in_take(&e, &name)))),
     };
     let take = Take {
         problems,
@@ -105,6 +105,19 @@ pub(super) fn read(
         ..curves.take(name)
     };
     (curves, take)
+}
+
+/// An error with the take in its place.
+fn in_take(error: &GltfError, take: &str) -> Explanation {
+    let explanation = error.explain();
+    match (error, &explanation.place) {
+        (GltfError::Curve { .. }, _) => explanation,
+        (_, Some(place)) => {
+            let place = format!("take `{take}`, {place}");
+            explanation.place(place)
+        }
+        (_, None) => explanation.place(format!("take `{take}`")),
+    }
 }
 
 /// Reads the curves of an animation. What can't move a joint (morph weights, pointers) is passed over.
@@ -134,7 +147,7 @@ fn curves(
             .copied()
             .ok_or_else(|| GltfError::Tree {
                 node,
-                reason: "it is moved, but it isn't in the file".to_owned(),
+                reason: "it is moved, but it isn't in the file",
             })?;
         let name = &tree.nodes[place].name;
         let broken = |reason: String| GltfError::Curve {
@@ -213,20 +226,18 @@ fn pointers(animation: &Animation, take: &str) -> Option<Problem> {
     let count = channels
         .filter(|channel| channel.target.node.is_none())
         .count();
-    (count > 0).then(|| Problem {
-        id: "pointer-curves-left-out".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "take `{take}` has {count} curves that point to other things than a node's place, which aren't used; bake them to nodes if the motion looks wrong"
-        ),
+    (count > 0).then(|| {
+        Problem::note(
+            "pointer-curves-left-out",
+            format!(
+                "take `{take}` has {count} curves that drive something else than a node and were left out; bake them to nodes if the motion looks wrong"
+            ),
+        )
     })
 }
 
 /// A curve that isn't used.
 fn problem(id: &str, take: &str, node: &str, path: &str) -> Problem {
-    Problem {
-        id: id.to_owned(),
-        severity: Severity::Warning,
-        message: format!("take `{take}` has a curve for the {path} of `{node}` that isn't used"),
-    }
+    let message = format!("take `{take}` has a curve for the {path} of `{node}` that isn't used");
+    Problem::warning(id, message)
 }

@@ -1,8 +1,8 @@
 //! The node tree, parents before children, and how each node stands in its parent.
 
-use super::GltfError;
 use super::curve::unit;
 use super::document::{Document, Extensions};
+use super::error::GltfError;
 use crate::import::rigid::rotation_of;
 use crate::import::scene;
 use gltf::json::{Index, Node};
@@ -143,7 +143,7 @@ fn told(document: &Document) -> BTreeMap<usize, &str> {
 fn missing(node: usize) -> GltfError {
     GltfError::Tree {
         node,
-        reason: "it is named but isn't in the file".to_owned(),
+        reason: "it is named but isn't in the file",
     }
 }
 
@@ -157,7 +157,7 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
         for child in children(node) {
             let slot = parents.get_mut(child).ok_or_else(|| missing(child))?;
             if slot.replace(parent).is_some() {
-                let reason = "it has several parents".to_owned();
+                let reason = "it has several parents";
                 return Err(GltfError::Tree {
                     node: child,
                     reason,
@@ -190,6 +190,6 @@ fn order(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, G
         .unwrap_or_default();
     Err(GltfError::Tree {
         node,
-        reason: "it is its own ancestor".to_owned(),
+        reason: "it is its own ancestor",
     })
 }
