@@ -60,7 +60,7 @@ fn a_trim_keeps_a_part() {
     assert_eq!(frames(&open), Some(16));
     let said = bench.complaint(&["import", "sway.txt", "--trim", "5..6"], 2);
     assert!(
-        said.contains("sway.txt") && said.contains("trim within it"),
+        said.contains("sway.txt") && said.contains("choose a part within"),
         "{said}"
     );
 }
