@@ -174,7 +174,7 @@ impl RetargetArgs {
 
     pub fn skeleton(&self) -> Outcome<Skeleton> {
         let name = self.skeleton.as_deref().unwrap_or("humanoid");
-        Skeleton::load(name).map_err(|e| Failure::skeleton(Path::new(name), e))
+        Skeleton::load(name).map_err(Failure::user)
     }
 }
 

@@ -1,7 +1,6 @@
 //! What can end a command early, and the exit code it ends with.
 
 use mimic::motion::MotionError;
-use mimic::skeleton::{Skeleton, SkeletonError};
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -65,22 +64,6 @@ impl Failure {
                 Self::input(path, format!("{cause}; retarget its clip again"))
             }
             cause => Self::input(path, cause),
-        }
-    }
-
-    pub fn skeleton(wanted: &Path, cause: SkeletonError) -> Self {
-        match cause {
-            SkeletonError::Read { path, source } => {
-                let known: Vec<_> = Skeleton::built_in().collect();
-                let known = known.join(", ");
-                let remedy = format!("{CHECK}, or use a built-in character: {known}");
-                Self::input(&path, format!("cannot be read ({source}); {remedy}"))
-            }
-            SkeletonError::UnknownName { .. } => Self::user(cause),
-            SkeletonError::Mjcf { .. } => {
-                Self::input(wanted, format!("{cause}; see that MuJoCo opens it"))
-            }
-            cause => Self::input(wanted, cause),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::error::SimError;
 use super::state::LinkState;
-use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton};
+use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton, point_inertia};
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
@@ -179,8 +179,9 @@ impl Character {
         let mass = link.mass + body.mass;
         if mass > 0.0 {
             let center = (link.com * link.mass + com * body.mass) / mass;
-            link.inertia +=
-                shifted(link.mass, link.com - center) + inertia + shifted(body.mass, com - center);
+            link.inertia += point_inertia(link.mass, &(link.com - center))
+                + inertia
+                + point_inertia(body.mass, &(com - center));
             link.com = center;
             link.mass = mass;
         }
@@ -244,11 +245,6 @@ impl Character {
     ) -> UnitQuaternion<f32> {
         self.links[link].rest.rotation.cast::<f32>().inverse() * parent.inverse() * child
     }
-}
-
-/// Inertia of a point mass at `r` (parallel axis theorem).
-fn shifted(mass: f64, r: Vector3<f64>) -> Matrix3<f64> {
-    (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * mass
 }
 
 fn moved(shape: &Shape, by: &Isometry3<f64>) -> Shape {

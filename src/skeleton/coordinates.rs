@@ -5,7 +5,7 @@ use super::{JointKind, Skeleton};
 use nalgebra::{UnitQuaternion, Vector3};
 
 impl Skeleton {
-    /// Constant velocity that leads from `q0` to `q1` in `dt` seconds, rotations taking the shorter way.
+    /// Constant velocity `[nv]` that leads from `q0` to `q1` (both `[nq]`) in `dt` seconds, rotations taking the shorter way.
     ///
     /// # Panics
     /// If `q0` or `q1` is shorter than [`Skeleton::nq`].
@@ -25,7 +25,7 @@ impl Skeleton {
         qvel
     }
 
-    /// Coordinates reached from `qpos` after `dt` seconds at constant `qvel`.
+    /// Coordinates `[nq]` that are reached from `qpos` (`[nq]`) after `dt` seconds at constant `qvel` (`[nv]`).
     ///
     /// # Panics
     /// If `qpos` is shorter than [`Skeleton::nq`] or `qvel` than [`Skeleton::nv`].
@@ -46,7 +46,7 @@ impl Skeleton {
         moved
     }
 
-    /// Coordinates a fraction `t` of the way from `q0` to `q1`: rotations on the shorter arc at constant rate.
+    /// Coordinates `[nq]` at the fraction `t` of the way from `q0` to `q1`, rotations along the shorter arc at constant rate.
     ///
     /// # Panics
     /// If `q0` or `q1` is shorter than [`Skeleton::nq`].
@@ -60,15 +60,18 @@ pub(super) fn store_quaternion(values: &mut [f64], at: usize, q: &UnitQuaternion
     values[at..at + 4].copy_from_slice(&[q.w, q.i, q.j, q.k]);
 }
 
+/// Writes a vector.
 pub(super) fn store(values: &mut [f64], at: usize, v: Vector3<f64>) {
     values[at..at + 3].copy_from_slice(v.as_slice());
 }
 
-/// Rotation vector from the quaternion in `q0` to that in `q1`, in the frame of either.
+/// Rotation vector from the quaternion in `q0` to that in `q1`, radians. Its components are the same in both frames, because
+/// the axis of a rotation stays where it is.
 fn turn(q0: &[f64], q1: &[f64], at: usize) -> Vector3<f64> {
     (quaternion(q0, at).inverse() * quaternion(q1, at)).scaled_axis()
 }
 
+/// Rotates the quaternion at `at` by a rotation vector in the body's own frame, as MuJoCo's `mju_quatIntegrate` does.
 fn turned(qpos: &mut [f64], at: usize, rotation: Vector3<f64>) {
     let q = quaternion(qpos, at) * UnitQuaternion::from_scaled_axis(rotation);
     store_quaternion(qpos, at, &q);

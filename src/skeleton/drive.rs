@@ -1,36 +1,41 @@
-//! Drives and coordinate ranges of a joint, from its actuators or, failing those, from the joint itself.
+//! Drives and ranges of a joint's coordinates, from its actuators or, where it has none, from the joint itself.
 
+use super::error::Defect;
 use super::{Drive, JointKind};
 use mjcf_rs::Model;
 use mjcf_rs::body::Joint as MjcfJoint;
 use mjcf_rs::extras::{Actuator, ActuatorKind};
 use std::f64::consts::PI;
 
-/// Gain of a joint that only a torque motor drives, per N·m of the motor's limit: the torque limit is reached a
-/// quarter of a radian from the target, as for the drives of the built-in humanoid.
+/// Stiffness of a joint that only a torque motor drives, per N·m of the motor's limit, 1/rad. Chosen: the drive reaches its
+/// limit a quarter of a radian from the target, about as the drives of the built-in humanoid do.
 const KP_PER_FORCE: f64 = 4.0;
-/// Damping per gain in the same case, s.
+/// Damping per stiffness of such a joint, s. It is the ratio of the built-in humanoid's drives.
 const KD_PER_KP: f64 = 0.1;
 
-/// One actuator's part in one coordinate, gear resolved.
+/// What one actuator does to one coordinate, in terms of that coordinate (its gear is resolved).
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Servo {
+    /// Which of the joint's degrees of freedom it drives.
     axis: usize,
-    /// Gains of a position servo; `None` for a torque motor.
+    /// Stiffness and damping of a position actuator; `None` for a torque motor.
     gains: Option<(f64, f64)>,
+    /// N·m (N for a slide); infinite without a limit.
     force_limit: f64,
+    /// Range of its targets, if that is limited.
     range: Option<[f64; 2]>,
 }
 
-/// Drives and ranges, one per degree of freedom; none for a free joint.
+/// Drives and ranges, one for each degree of freedom; none for a free joint.
 ///
-/// A position servo (`<position>`, or `<general>` with affine bias) says it all. Where only a torque motor acts, the joint's own `stiffness` and `damping` are the drive if that spring reaches the motor's
-/// limit within a radian (some models note their gains so); otherwise gains are scaled from the limit.
+/// A position actuator (`<position>`, or `<general>` with affine bias) states stiffness and damping itself. Where only a
+/// torque motor acts, the joint's own `stiffness` and `damping` make the drive if that spring reaches the motor's limit
+/// within a radian: some models note the gains of their controller there. Otherwise the gains follow from the limit.
 pub(super) fn drives(
     joint: &MjcfJoint,
     kind: JointKind,
     model: &Model,
-) -> Result<(Vec<Drive>, Vec<[f64; 2]>), String> {
+) -> Result<(Vec<Drive>, Vec<[f64; 2]>), Defect> {
     let dofs = match kind {
         JointKind::Free => 0,
         JointKind::Ball => 3,
@@ -46,6 +51,7 @@ pub(super) fn drives(
     let mut drives = Vec::with_capacity(dofs);
     let mut limits = Vec::with_capacity(dofs);
     for axis in 0..dofs {
+        // A position actuator says more than a motor on the same coordinate.
         let servo = servos
             .iter()
             .filter(|s| s.axis == axis)
@@ -56,12 +62,18 @@ pub(super) fn drives(
     Ok((drives, limits))
 }
 
-/// An actuator with gear g sees g·q: in terms of q, gains scale with g², force with g, targets with 1/g.
-fn servo(actuator: &Actuator, dofs: usize, autolimits: bool) -> Result<Servo, String> {
+/// An actuator in terms of the coordinate q that it drives.
+///
+/// An actuator with gear g has length g·q and gives q the force g·f (MuJoCo, "Computation", "Transmission"), so in terms of
+/// q its gains scale with g², its force limit with g and its targets with 1/g.
+fn servo(actuator: &Actuator, dofs: usize, autolimits: bool) -> Result<Servo, Defect> {
     let gears = actuator.gear.iter().take(dofs).enumerate();
     let mut along = gears.filter(|(_, g)| **g != 0.0);
     let (Some((axis, &gear)), None) = (along.next(), along.next()) else {
-        return Err("an actuator's `gear` has to point along one axis of the joint".into());
+        return Err(Defect::new(
+            "an actuator's `gear` points along none or several of the joint's axes",
+            "give each axis an actuator of its own",
+        ));
     };
     let limited = |state: mjcf_rs::Tristate, range: Option<[f64; 2]>| {
         range.filter(|_| state.resolve(autolimits, true))
@@ -71,6 +83,7 @@ fn servo(actuator: &Actuator, dofs: usize, autolimits: bool) -> Result<Servo, St
     let largest = |r: [f64; 2]| r[0].abs().max(r[1].abs());
     let gains = servo_gains(actuator);
     let mut force_limit = force.map_or(f64::INFINITY, largest);
+    // The control of a torque motor is its force, so that a control range limits the force too.
     if let (None, Some(ctrl)) = (gains, ctrl) {
         force_limit = force_limit.min(largest(ctrl));
     }
@@ -84,6 +97,8 @@ fn servo(actuator: &Actuator, dofs: usize, autolimits: bool) -> Result<Servo, St
     })
 }
 
+/// Stiffness and damping of a position actuator, before its gear. In MuJoCo an affine bias is
+/// `biasprm[0] + biasprm[1]·length + biasprm[2]·velocity`, so a position servo has −kp and −kv there.
 fn servo_gains(actuator: &Actuator) -> Option<(f64, f64)> {
     match actuator.kind {
         ActuatorKind::Position => Some((actuator.kp.unwrap_or(1.0), actuator.kv.unwrap_or(0.0))),
@@ -99,6 +114,7 @@ fn ordered(a: f64, b: f64) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 
+/// The drive of one coordinate. A joint without a motor, or with one of unlimited force, is driven by its own spring.
 fn drive(joint: &MjcfJoint, servo: Option<&Servo>) -> Drive {
     let force_limit = servo.map_or(f64::INFINITY, |s| s.force_limit);
     if let Some((kp, kd)) = servo.and_then(|s| s.gains) {
@@ -122,13 +138,16 @@ fn drive(joint: &MjcfJoint, servo: Option<&Servo>) -> Drive {
     }
 }
 
-/// The joint's range where it is limited, else the servo's, else a full turn.
+/// The joint's range where it is limited, else the range of the servo's targets, else a full turn.
+///
+/// MuJoCo limits the rotation angle of a ball joint as a whole, while our ranges are those of its exponential-map
+/// coordinates. So the ranges of the three servos, which are given by axis, come first there.
 fn limit(
     joint: &MjcfJoint,
     kind: JointKind,
     servo: Option<&Servo>,
     model: &Model,
-) -> Result<[f64; 2], String> {
+) -> Result<[f64; 2], Defect> {
     let compiler = &model.compiler;
     let range = joint
         .range
@@ -157,6 +176,9 @@ fn limit(
     if low < high {
         Ok([low, high])
     } else {
-        Err(format!("its range {low} to {high} is empty"))
+        Err(Defect::new(
+            format!("its range {low} to {high} is empty"),
+            "write the lower end of `range` first",
+        ))
     }
 }

@@ -1,26 +1,123 @@
-//! What can be wrong with a character's description.
+//! What can be wrong with the description of a character.
 
-use std::path::PathBuf;
+use super::Skeleton;
+use crate::explain::{Explain, Explanation, Parameter, explained};
+use std::path::{Path, PathBuf};
 
-/// Why a skeleton could not be loaded. Every message names the file or element and what to do about it.
-#[derive(Debug, thiserror::Error)]
+/// Why a skeleton could not be loaded.
+#[derive(Debug)]
 pub enum SkeletonError {
-    #[error("cannot read `{path}`: {source}", path = path.display())]
+    /// A file that cannot be read.
     Read {
+        /// The file.
         path: PathBuf,
+        /// What the system says.
         source: std::io::Error,
     },
-    #[error("no skeleton is called `{name}`: use one of {known}, or a path to an MJCF file (.xml)")]
-    UnknownName { name: String, known: String },
-    #[error("skeleton `{skeleton}` is not valid MJCF: {message}")]
-    Mjcf { skeleton: String, message: String },
-    #[error("skeleton `{skeleton}`, {place}: {message}")]
-    Unsupported {
-        skeleton: String,
-        /// Element at fault, e.g. "joint `knee`".
-        place: String,
-        message: String,
+    /// A name that is neither a built-in character's nor a file's.
+    UnknownName {
+        /// The name.
+        name: String,
     },
-    #[error("slots of skeleton `{skeleton}`: {message}")]
-    Slots { skeleton: String, message: String },
+    /// MJCF that is not valid, or that describes something else than one character.
+    Mjcf {
+        /// Name of the skeleton.
+        skeleton: String,
+        /// The MJCF file, if the text came from one.
+        file: Option<PathBuf>,
+        /// The element at fault, such as "joint `knee`"; `None` for the text as a whole.
+        place: Option<String>,
+        /// What is wrong.
+        cause: String,
+        /// What to do, beginning with a verb.
+        remedy: String,
+    },
+    /// Humanoid slots that cannot be read, or that name no body.
+    Slots {
+        /// Name of the skeleton.
+        skeleton: String,
+        /// The JSON file, if the text came from one.
+        file: Option<PathBuf>,
+        /// What is wrong.
+        cause: String,
+        /// What to do, beginning with a verb.
+        remedy: String,
+    },
+}
+
+impl SkeletonError {
+    /// The same error with the names of the files that the texts came from.
+    pub(super) fn in_files(mut self, mjcf: &Path, slots: &Path) -> Self {
+        match &mut self {
+            Self::Mjcf { file, .. } => *file = Some(mjcf.to_owned()),
+            Self::Slots { file, .. } => *file = Some(slots.to_owned()),
+            Self::Read { .. } | Self::UnknownName { .. } => {}
+        }
+        self
+    }
+}
+
+impl Explain for SkeletonError {
+    fn explain(&self) -> Explanation {
+        let built_in = || Skeleton::built_in().collect::<Vec<_>>().join(", ");
+        match self {
+            Self::Read { path, source } => {
+                let advice = format!(
+                    "check the path and its permissions, or use a built-in character: {}",
+                    built_in()
+                );
+                Explanation::input(format!("cannot be read ({source})"))
+                    .file(path)
+                    .remedy_by(Parameter::Skeleton, advice)
+            }
+            Self::UnknownName { name } => {
+                let advice = format!("use one of {}, or an MJCF file (.xml)", built_in());
+                Explanation::input(format!("no skeleton is called `{name}`"))
+                    .remedy_by(Parameter::Skeleton, advice)
+            }
+            Self::Mjcf {
+                skeleton,
+                file,
+                place,
+                cause,
+                remedy,
+            } => located(skeleton, file.as_deref(), place.as_deref(), cause).remedy(remedy),
+            Self::Slots {
+                skeleton,
+                file,
+                cause,
+                remedy,
+            } => located(skeleton, file.as_deref(), Some("slots"), cause).remedy(remedy),
+        }
+    }
+}
+
+/// An error in a file, or, where there is none, in the skeleton by its name.
+fn located(skeleton: &str, file: Option<&Path>, place: Option<&str>, cause: &str) -> Explanation {
+    let error = Explanation::input(cause);
+    match (file, place) {
+        (Some(file), Some(place)) => error.file(file).place(place),
+        (Some(file), None) => error.file(file),
+        (None, Some(place)) => error.place(format!("skeleton `{skeleton}`, {place}")),
+        (None, None) => error.place(format!("skeleton `{skeleton}`")),
+    }
+}
+
+explained!(SkeletonError);
+
+/// What is wrong with one element, before its name and file are known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Defect {
+    pub cause: String,
+    pub remedy: String,
+}
+
+impl Defect {
+    /// `remedy` begins with a verb.
+    pub fn new(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self {
+            cause: cause.into(),
+            remedy: remedy.into(),
+        }
+    }
 }

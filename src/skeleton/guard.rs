@@ -1,9 +1,13 @@
-//! A look at MJCF text before the parser sees it: bounded nesting, and only what a self-contained character uses.
+//! Checks MJCF text before the parser sees it: nesting is bounded, and nothing reads other files or generates bodies.
 
-/// Deepest nesting of elements. The parser recurses once per level, and no character comes near this.
+use super::error::Defect;
+
+/// Deepest nesting of elements that is let through. Chosen: the parser recurses once per level, a thread's usual stack
+/// holds 100 levels, and no character comes near that depth.
 const MAX_DEPTH: usize = 100;
 
-/// Elements that read other files or generate bodies; a skeleton has to stand in one text.
+/// Elements that read other files or generate bodies. A skeleton has to be complete in one text, because runs and policy
+/// files carry that text along.
 const REFUSED: [&str; 6] = [
     "include",
     "attach",
@@ -13,13 +17,14 @@ const REFUSED: [&str; 6] = [
     "flexcomp",
 ];
 
-/// Checks `xml`; the error says which element is at fault and what to do.
-pub(super) fn check(xml: &str) -> Result<(), String> {
+/// Checks the markup of `xml`. It looks at tags only; whether they are MJCF is for the parser to say.
+pub(super) fn check(xml: &str) -> Result<(), Defect> {
     let mut depth = 0_usize;
     let mut rest = xml;
     while let Some(start) = rest.find('<') {
         rest = &rest[start..];
-        let end = markup_end(rest).ok_or("a tag or comment is not closed")?;
+        let end = markup_end(rest)
+            .ok_or_else(|| Defect::new("a tag or comment is not closed", "close it"))?;
         let tag = &rest[..end];
         rest = &rest[end..];
         if tag.starts_with("</") {
@@ -31,7 +36,10 @@ pub(super) fn check(xml: &str) -> Result<(), String> {
             }
         }
         if depth > MAX_DEPTH {
-            return Err(format!("elements are nested more than {MAX_DEPTH} deep"));
+            return Err(Defect::new(
+                format!("elements are nested more than {MAX_DEPTH} deep"),
+                "remove levels of nesting",
+            ));
         }
     }
     Ok(())
@@ -56,18 +64,23 @@ fn markup_end(text: &str) -> Option<usize> {
     None
 }
 
-fn check_tag(tag: &str) -> Result<(), String> {
+fn check_tag(tag: &str) -> Result<(), Defect> {
     let name = tag[1..]
         .split(|c: char| c.is_whitespace() || c == '/' || c == '>')
         .next()
         .unwrap_or_default();
     if REFUSED.contains(&name) {
-        return Err(format!(
-            "<{name}> is not supported: write its content out (MuJoCo's mj_saveLastXML does this)"
+        return Err(Defect::new(
+            format!("<{name}> is not supported"),
+            "save the model with MuJoCo's mj_saveLastXML, which writes all its content out",
         ));
     }
+    // The parser panics on a longer sequence and skips letters that it doesn't know.
     if name == "compiler" && !euler_sequence_is_valid(tag) {
-        return Err("<compiler eulerseq> needs three letters out of x, y, z, X, Y, Z".into());
+        return Err(Defect::new(
+            "the `eulerseq` of <compiler> is not three letters out of x, y, z, X, Y, Z",
+            "correct it, for example to `xyz`",
+        ));
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Mass properties of bodies, with MuJoCo's rules for `<inertial>`, geoms and the compiler's bounds.
 
 use super::Body;
+use super::error::Defect;
 use super::shape::{Solid, isometry};
 use mjcf_rs::body::{InertiaSpec, Inertial};
 use mjcf_rs::compiler::Compiler;
@@ -9,13 +10,17 @@ use nalgebra::{Matrix3, Vector3};
 /// Mass, centre of mass and inertia about it, in the body's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MassProperties {
+    /// kg.
     pub(super) mass: f64,
+    /// Metres.
     pub(super) com: Vector3<f64>,
+    /// About the centre of mass, along the body's axes, kg·m².
     pub(super) inertia: Matrix3<f64>,
 }
 
 impl MassProperties {
-    /// All solids of one body together; zero for none.
+    /// The solids of one body together; zero for none. Each solid's own inertia is moved to the common centre of mass by the
+    /// parallel axis theorem.
     pub(super) fn from_solids(solids: &[Solid]) -> Self {
         let mass: f64 = solids.iter().map(|s| s.mass).sum();
         if mass <= 0.0 {
@@ -32,12 +37,13 @@ impl MassProperties {
         let com = moment / mass;
         let inertia = solids
             .iter()
-            .map(|s| s.inertia() + offset_inertia(s.mass, &(s.pose.translation.vector - com)))
+            .map(|s| s.inertia() + point_inertia(s.mass, &(s.pose.translation.vector - com)))
             .sum();
         Self { mass, com, inertia }
     }
 
-    pub(super) fn from_inertial(inertial: &Inertial) -> Result<Self, String> {
+    /// The properties that `<inertial>` states, turned to the body's axes.
+    pub(super) fn from_inertial(inertial: &Inertial) -> Result<Self, Defect> {
         let pose = isometry(&inertial.pose);
         let own = match inertial.inertia {
             InertiaSpec::Diagonal([x, y, z]) => Matrix3::from_diagonal(&Vector3::new(x, y, z)),
@@ -49,7 +55,10 @@ impl MassProperties {
         let inertia = r * own * r.transpose();
         let finite = inertial.mass.is_finite() && inertia.iter().all(|x| x.is_finite());
         if !finite || inertial.mass < 0.0 {
-            return Err("its <inertial> needs a finite mass and inertia, not negative".into());
+            return Err(Defect::new(
+                "the mass or inertia of its <inertial> is negative or not finite",
+                "write finite numbers that are not negative",
+            ));
         }
         Ok(Self {
             mass: inertial.mass,
@@ -58,7 +67,7 @@ impl MassProperties {
         })
     }
 
-    /// Applies `<compiler boundmass boundinertia>`.
+    /// Applies `<compiler boundmass boundinertia>`: lower bounds of the mass and of the principal moments of inertia.
     pub(super) fn bounded(mut self, compiler: &Compiler) -> Self {
         self.mass = self.mass.max(compiler.bound_mass);
         if compiler.bound_inertia > 0.0 {
@@ -72,12 +81,13 @@ impl MassProperties {
     }
 }
 
-/// Inertia of a point mass at `offset` (parallel axis theorem).
-fn offset_inertia(mass: f64, offset: &Vector3<f64>) -> Matrix3<f64> {
+/// Inertia about the origin of a point mass at `offset`, m (|r|² 1 − r rᵀ): what the parallel axis theorem adds.
+pub(crate) fn point_inertia(mass: f64, offset: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * offset.norm_squared() - offset * offset.transpose()) * mass
 }
 
-/// Applies `<compiler settotalmass>`: masses and inertias are scaled alike.
+/// Applies `<compiler settotalmass>`: scales all masses and inertias by the same factor, so that they add up to `target` kg.
+/// In MuJoCo a target that is not positive means no scaling.
 pub(super) fn set_total_mass(bodies: &mut [Body], target: f64) {
     let total: f64 = bodies.iter().map(|b| b.mass).sum();
     if target > 0.0 && target.is_finite() && total > 0.0 {

@@ -1,22 +1,23 @@
-//! Forward kinematics and body velocities, stage for stage as MuJoCo's `mj_kinematics` and `mj_comVel`.
+//! Forward kinematics and the velocities of bodies, in the order of operations of MuJoCo's `mj_kinematics`.
 
 use super::{Joint, JointKind, Skeleton, Twist};
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Unit quaternion at `qpos[at..at + 4]`, scalar first.
 ///
-/// The caller has checked the length of `qpos`; a zero quaternion stands for no rotation, as in MuJoCo.
+/// The caller has checked the length of `qpos`. A quaternion that is zero stands for no rotation, as in MuJoCo.
 pub(super) fn quaternion(qpos: &[f64], at: usize) -> UnitQuaternion<f64> {
     let q = Quaternion::new(qpos[at], qpos[at + 1], qpos[at + 2], qpos[at + 3]);
     Unit::try_new(q, 1e-12).unwrap_or_else(UnitQuaternion::identity)
 }
 
+/// Vector at `values[at..at + 3]`.
 pub(super) fn vector(values: &[f64], at: usize) -> Vector3<f64> {
     Vector3::new(values[at], values[at + 1], values[at + 2])
 }
 
 impl Joint {
-    /// Rotation that the joint's coordinates make, in the child's frame; of a free joint its orientation.
+    /// Rotation that the joint's coordinates make, in the child's frame; for a free joint, its orientation in the world.
     pub(super) fn rotation(&self, qpos: &[f64]) -> UnitQuaternion<f64> {
         match self.kind {
             JointKind::Free => quaternion(qpos, self.qpos + 3),
@@ -38,6 +39,7 @@ impl Joint {
             JointKind::Slide(axis) => before * Translation3::from(axis * qpos[self.qpos]),
             JointKind::Ball | JointKind::Hinge(_) => {
                 let turn = self.rotation(qpos);
+                // The anchor stays where it is, so the frame's origin moves about it.
                 let shift = self.anchor - turn * self.anchor;
                 before * Isometry3::from_parts(shift.into(), turn)
             }
@@ -54,7 +56,7 @@ impl Joint {
 }
 
 impl Skeleton {
-    /// World from body for every body at `qpos` (MuJoCo's `xpos` and `xquat`).
+    /// World from body of every body at `qpos`, `[bodies]`: forward kinematics (MuJoCo's `xpos` and `xquat`).
     ///
     /// # Panics
     /// If `qpos` is shorter than [`Skeleton::nq`].
@@ -71,7 +73,10 @@ impl Skeleton {
         world
     }
 
-    /// World velocities of every body at `qpos` and `qvel`.
+    /// Velocity of every body at `qpos` and `qvel`, `[bodies]`.
+    ///
+    /// From the root outwards: each body moves with its parent and adds what its own joints do. Several joints of one body
+    /// act one after the other, so each turns in the frame that the joints before it have left.
     ///
     /// # Panics
     /// If `qpos` is shorter than [`Skeleton::nq`] or `qvel` than [`Skeleton::nv`].
@@ -97,7 +102,7 @@ impl Skeleton {
 }
 
 impl Joint {
-    /// Adds what the joint's rate gives the body whose final origin is `origin`.
+    /// Adds the velocity that the joint's rate gives to the body whose origin is `origin` after all its joints.
     fn add_velocity(
         &self,
         before: &Isometry3<f64>,
@@ -116,6 +121,7 @@ impl Joint {
                 twist.linear += before.rotation * axis * qvel[self.dof];
                 return;
             }
+            // A ball's velocity is in the child's frame, a hinge's axis doesn't move when it turns.
             JointKind::Ball => after.rotation * vector(qvel, self.dof),
             JointKind::Hinge(axis) => before.rotation * axis * qvel[self.dof],
         };
@@ -136,7 +142,8 @@ impl Default for Twist {
 }
 
 impl Twist {
-    /// The same motion, with its linear part taken at world point `point` instead of the origin of `body`.
+    /// The same motion with its linear part taken at the world point `point` instead of the origin of `body` (world from
+    /// body): v + ω × r.
     pub fn at(&self, body: &Isometry3<f64>, point: &Vector3<f64>) -> Self {
         let arm = point - body.translation.vector;
         Self {

@@ -1,16 +1,20 @@
-//! MJCF text to [`Skeleton`].
+//! Loads a [`Skeleton`] from MJCF text.
+//!
+//! The parser hands out MJCF's elements with defaults resolved; what MuJoCo's compiler makes of them is done here and in
+//! the neighbouring files, so that masses, frames and drives are those that MuJoCo would compile.
 
+use super::error::{Defect, SkeletonError};
 use super::inertia::{MassProperties, set_total_mass};
 use super::shape::{Solid, isometry};
-use super::{Body, Joint, JointKind, Skeleton, SkeletonError, drive, guard, slots};
+use super::{Body, Joint, JointKind, Skeleton, drive, guard, slots};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Body as MjcfBody, GeomType, Joint as MjcfJoint, JointType};
 use mjcf_rs::compiler::InertiaFromGeom;
 use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Characters compiled into the library: name, MJCF, slots.
+/// Characters compiled into the library: name, MJCF, slots as JSON.
 const BUILT_IN: [(&str, &str, &str); 3] = [
     (
         "humanoid",
@@ -30,50 +34,62 @@ const BUILT_IN: [(&str, &str, &str); 3] = [
 ];
 
 impl Skeleton {
-    /// Names of the built-in characters.
+    /// Names of the built-in characters, which [`Skeleton::load`] takes.
     pub fn built_in() -> impl Iterator<Item = &'static str> {
         BUILT_IN.iter().map(|(name, ..)| *name)
     }
 
-    /// Loads a built-in character by name, or an MJCF file by path, with `NAME.json` beside it if it is there.
-    pub fn load(name_or_path: &str) -> Result<Self, SkeletonError> {
-        if let Some((name, xml, json)) = BUILT_IN.iter().find(|(name, ..)| *name == name_or_path) {
+    /// Loads a built-in character by name, or an MJCF file by path.
+    ///
+    /// The humanoid slots of `dir/robot.xml` are read from `dir/robot.json` if that file exists, and otherwise guessed from
+    /// the names of the bodies (see [`Skeleton::from_mjcf`]).
+    ///
+    /// # Errors
+    /// [`SkeletonError::UnknownName`] for a word that is neither a built-in character nor a file,
+    /// [`SkeletonError::Read`] for a file that cannot be read, and the errors of [`Skeleton::from_mjcf`].
+    pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, SkeletonError> {
+        let path = name_or_path.as_ref();
+        let built_in = BUILT_IN.iter().find(|(name, ..)| path == Path::new(name));
+        if let Some((name, xml, json)) = built_in {
             return Self::from_mjcf(name, xml, Some(json));
         }
-        let path = Path::new(name_or_path);
+        // A bare word that is no file was meant as a name.
         if path.extension().is_none() && !path.exists() {
             return Err(SkeletonError::UnknownName {
-                name: name_or_path.into(),
-                known: Self::built_in().collect::<Vec<_>>().join(", "),
+                name: path.to_string_lossy().into_owned(),
             });
         }
         let xml = read(path)?;
         let beside = path.with_extension("json");
         let json = beside.is_file().then(|| read(&beside)).transpose()?;
-        let name = path
-            .file_stem()
-            .map_or_else(|| name_or_path.into(), |s| s.to_string_lossy().into_owned());
-        Self::from_mjcf(&name, &xml, json.as_deref())
+        let name = path.file_stem().unwrap_or(path.as_os_str());
+        Self::from_mjcf(&name.to_string_lossy(), &xml, json.as_deref())
+            .map_err(|error| error.in_files(path, &beside))
     }
 
-    /// Reads MJCF text, as MuJoCo would compile it, into a character.
+    /// Makes a character of MJCF text, with the masses, frames and joints that MuJoCo would compile.
     ///
-    /// `slots_json` is `{"slots": {"hips": "pelvis", …}}`; without it slots are guessed from body names. The
-    /// text has to hold one character whose top body has a free joint, and may hold static scenery, which is
-    /// ignored. Position servos become drives; a joint with a mere torque motor takes its drive from its
-    /// `stiffness` and `damping` if that spring reaches the motor's limit within a radian, and else gains of
-    /// 4 × (limit) N·m/rad with a tenth of that as damping.
+    /// The text has to describe one character whose top body has a free joint. It may also describe static scenery, which
+    /// is ignored. `slots_json` is `{"slots": {"hips": "pelvis", …}}`; without it, slots are guessed from the names of the
+    /// bodies.
+    ///
+    /// Position actuators become drives. A joint that has only a torque motor takes its drive from its `stiffness` and
+    /// `damping` if that spring reaches the motor's limit within a radian; otherwise it gets a stiffness of
+    /// 4 × (limit) N·m/rad and a tenth of that as damping, N·m·s/rad.
+    ///
+    /// # Errors
+    /// [`SkeletonError::Mjcf`] for text that is no MJCF, or describes something else than one such character;
+    /// [`SkeletonError::Slots`] for slots that cannot be read or name no body.
     pub fn from_mjcf(
         name: &str,
         xml: &str,
         slots_json: Option<&str>,
     ) -> Result<Self, SkeletonError> {
-        let mjcf = |message: String| SkeletonError::Mjcf {
-            skeleton: name.into(),
-            message,
-        };
-        guard::check(xml).map_err(mjcf)?;
-        let model = Model::from_str(xml, ".").map_err(|e| mjcf(e.to_string()))?;
+        guard::check(xml).map_err(|defect| mjcf_error(name, None, defect))?;
+        let model = Model::from_str(xml, ".").map_err(|e| {
+            let defect = Defect::new(format!("not valid MJCF ({})", one_line(&e)), OPENS);
+            mjcf_error(name, None, defect)
+        })?;
         let mut builder = Builder::new(name, &model);
         builder.add_bodies()?;
         let Builder {
@@ -82,12 +98,15 @@ impl Skeleton {
         set_total_mass(&mut bodies, model.compiler.set_total_mass);
         check_masses(name, &bodies)?;
         let slots = match slots_json {
-            Some(json) => {
-                slots::from_json(json, &bodies).map_err(|message| SkeletonError::Slots {
+            Some(json) => slots::from_json(json, &bodies).map_err(|defect| {
+                let Defect { cause, remedy } = defect;
+                SkeletonError::Slots {
                     skeleton: name.into(),
-                    message,
-                })?
-            }
+                    file: None,
+                    cause,
+                    remedy,
+                }
+            })?,
             None => slots::from_names(&bodies),
         };
         Ok(Self {
@@ -104,24 +123,47 @@ impl Skeleton {
 
 fn read(path: &Path) -> Result<String, SkeletonError> {
     std::fs::read_to_string(path).map_err(|source| SkeletonError::Read {
-        path: PathBuf::from(path),
+        path: path.to_owned(),
         source,
     })
 }
 
-/// Every body that moves on its own needs mass, in itself or in bodies welded to it.
+/// What to do about numbers such as `nan` and `1e999`.
+const FINITE: &str = "write finite numbers";
+/// What to do about text that the parser refuses: MuJoCo names the line and the attribute.
+const OPENS: &str = "correct the file until MuJoCo opens it";
+
+fn one_line(message: &impl ToString) -> String {
+    let text = message.to_string();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn mjcf_error(skeleton: &str, place: Option<String>, defect: Defect) -> SkeletonError {
+    let Defect { cause, remedy } = defect;
+    SkeletonError::Mjcf {
+        skeleton: skeleton.into(),
+        file: None,
+        place,
+        cause,
+        remedy,
+    }
+}
+
+/// Checks that every body that moves on its own has mass, in itself or in bodies welded to it.
 fn check_masses(skeleton: &str, bodies: &[Body]) -> Result<(), SkeletonError> {
     let mut carried: Vec<f64> = bodies.iter().map(|b| b.mass).collect();
+    // Parents come before their children, so from the last body on each welded mass reaches the body that moves it.
     for (index, body) in bodies.iter().enumerate().rev() {
         match body.parent {
             Some(parent) if body.joints.is_empty() => carried[parent] += carried[index],
             _ if carried[index] > 0.0 => {}
             _ => {
-                return Err(SkeletonError::Unsupported {
-                    skeleton: skeleton.into(),
-                    place: format!("body `{}`", body.name),
-                    message: "it moves but has no mass; give it a geom or an <inertial>".into(),
-                });
+                let place = format!("body `{}`", body.name);
+                let defect = Defect::new(
+                    "it moves but has no mass",
+                    "give it a geom or an <inertial>",
+                );
+                return Err(mjcf_error(skeleton, Some(place), defect));
             }
         }
     }
@@ -133,7 +175,7 @@ struct Builder<'a> {
     skeleton: &'a str,
     model: &'a Model,
     bodies: Vec<Body>,
-    /// Our index of each of the model's bodies, `None` for scenery.
+    /// Our index of each body of the model; `None` for scenery.
     index: Vec<Option<usize>>,
     nq: usize,
     nv: usize,
@@ -151,12 +193,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn error(&self, place: String, message: impl Into<String>) -> SkeletonError {
-        SkeletonError::Unsupported {
-            skeleton: self.skeleton.into(),
-            place,
-            message: message.into(),
-        }
+    fn error(&self, place: impl Into<String>, defect: Defect) -> SkeletonError {
+        mjcf_error(self.skeleton, Some(place.into()), defect)
     }
 
     fn add_bodies(&mut self) -> Result<(), SkeletonError> {
@@ -168,6 +206,7 @@ impl<'a> Builder<'a> {
             let free = joints.iter().any(|j| j.type_ == JointType::Free);
             let name = entry.body.name.clone();
             let name = name.unwrap_or_else(|| format!("body{id}"));
+            // A body that is fixed to the world is scenery, and so is the world body itself.
             if parent.is_none() && joints.is_empty() {
                 continue;
             }
@@ -177,15 +216,16 @@ impl<'a> Builder<'a> {
             self.bodies.push(body);
         }
         if self.bodies.is_empty() {
-            return Err(self.error(
-                "worldbody".into(),
-                "it has no body with a free joint; add <freejoint/> to the character's top body",
-            ));
+            let defect = Defect::new(
+                "no body has a free joint",
+                "add <freejoint/> to the character's top body",
+            );
+            return Err(self.error("<worldbody>", defect));
         }
         Ok(())
     }
 
-    /// That a body fits into the one tree on a free root.
+    /// Checks that a body fits into one tree whose root is free.
     fn check_place(
         &self,
         name: &str,
@@ -193,20 +233,30 @@ impl<'a> Builder<'a> {
         free: bool,
         joints: usize,
     ) -> Result<(), SkeletonError> {
-        let problem = match (has_parent, free) {
-            (false, false) => {
-                "it moves, but no body above it has a free joint; add <freejoint/> to the \
-                 character's top body, and take scenery with joints away"
-            }
-            (false, true) if !self.bodies.is_empty() => {
-                "it is a second moving tree; keep the character alone in the file"
-            }
-            (false, true) if joints > 1 => "a free joint has to be its body's only joint",
-            (true, true) => "only the top body can have a free joint",
-            _ if self.bodies.iter().any(|b| b.name == name) => "the name is used twice",
+        let (cause, remedy) = match (has_parent, free) {
+            (false, false) => (
+                "it moves, but no body above it has a free joint",
+                "add <freejoint/> to the character's top body, and remove scenery that has joints",
+            ),
+            (false, true) if !self.bodies.is_empty() => (
+                "it is a second moving tree",
+                "keep one character in the file and remove the rest",
+            ),
+            (false, true) if joints > 1 => (
+                "it has other joints beside its free joint",
+                "keep the free joint alone",
+            ),
+            (true, true) => (
+                "it has a free joint below the top body",
+                "replace the free joint with a ball joint or hinges",
+            ),
+            _ if self.bodies.iter().any(|b| b.name == name) => (
+                "the name is used twice",
+                "give every body a name of its own",
+            ),
             _ => return Ok(()),
         };
-        Err(self.error(format!("body `{name}`"), problem))
+        Err(self.error(format!("body `{name}`"), Defect::new(cause, remedy)))
     }
 
     fn body(
@@ -218,7 +268,8 @@ impl<'a> Builder<'a> {
         let place = format!("body `{name}`");
         let rest = isometry(&body.pose);
         if !rest.to_homogeneous().iter().all(|x| x.is_finite()) {
-            return Err(self.error(place, "its `pos` or rotation is not finite"));
+            let defect = Defect::new("its `pos` or rotation is not finite", FINITE);
+            return Err(self.error(place, defect));
         }
         let solids = self.solids(body, &place)?;
         let properties = self.mass_properties(body, &solids, &place)?;
@@ -229,6 +280,8 @@ impl<'a> Builder<'a> {
             .map(|(i, joint)| self.joint(&name, i, joint))
             .collect::<Result<Vec<_>, _>>()?;
         let colliding = solids.iter().filter(|s| s.collides);
+        // MuJoCo takes the larger friction of the two geoms of a contact; a body counts as one geom here. Without geoms it
+        // has MuJoCo's default for sliding friction, 1.
         let friction = colliding.clone().map(|s| s.friction).fold(None, larger);
         Ok(Body {
             name,
@@ -248,18 +301,23 @@ impl<'a> Builder<'a> {
         for geom in &body.geoms {
             let drawn_only = geom.contype == 0 && geom.conaffinity == 0;
             let meshed = matches!(geom.type_, GeomType::Mesh | GeomType::Sdf);
+            // A mesh that neither collides nor has a say in the mass is for the eye only.
             if meshed && drawn_only && body.inertial.is_some() {
                 continue;
             }
-            let label = geom.name.as_deref().unwrap_or("without a name");
-            let solid = Solid::from_geom(geom)
-                .map_err(|message| self.error(format!("{place}, geom {label}"), message))?;
+            let solid = Solid::from_geom(geom).map_err(|defect| {
+                let place = match &geom.name {
+                    Some(name) => format!("{place}, geom `{name}`"),
+                    None => format!("{place}, a geom without a name"),
+                };
+                self.error(place, defect)
+            })?;
             solids.extend(solid);
         }
         Ok(solids)
     }
 
-    /// `<inertial>` or geoms, as `<compiler inertiafromgeom>` says.
+    /// Mass properties from `<inertial>` or from geoms, as `<compiler inertiafromgeom>` says.
     fn mass_properties(
         &self,
         body: &MjcfBody,
@@ -273,7 +331,7 @@ impl<'a> Builder<'a> {
         };
         let properties = match (stated, compiler.inertia_from_geom) {
             (Some(inertial), _) => MassProperties::from_inertial(inertial)
-                .map_err(|message| self.error(place.into(), message))?,
+                .map_err(|defect| self.error(place, defect))?,
             (None, InertiaFromGeom::False) => MassProperties::from_solids(&[]),
             (None, _) => MassProperties::from_solids(solids),
         };
@@ -292,15 +350,16 @@ impl<'a> Builder<'a> {
         });
         let place = format!("joint `{name}`");
         if joint.ref_ != 0.0 {
-            return Err(self.error(place, "a `ref` offset is not supported; set it to 0"));
+            let defect = Defect::new("a `ref` offset is not supported", "set `ref` to 0");
+            return Err(self.error(place, defect));
         }
         let kind = self.joint_kind(joint, &place)?;
         let anchor = Vector3::from(joint.pos);
         if !anchor.iter().all(|x| x.is_finite()) {
-            return Err(self.error(place, "its `pos` is not finite"));
+            return Err(self.error(place, Defect::new("its `pos` is not finite", FINITE)));
         }
         let (drives, limits) = drive::drives(joint, kind, self.model)
-            .map_err(|message| self.error(place.clone(), message))?;
+            .map_err(|defect| self.error(place.as_str(), defect))?;
         let placed = Joint {
             name,
             kind,
@@ -317,10 +376,17 @@ impl<'a> Builder<'a> {
 
     fn joint_kind(&self, joint: &MjcfJoint, place: &str) -> Result<JointKind, SkeletonError> {
         let axis = || {
+            // Chosen: a shorter axis is a zero that went through text and rounding.
             Vector3::from(joint.axis)
                 .try_normalize(1e-9)
                 .filter(|a| a.iter().all(|x| x.is_finite()))
-                .ok_or_else(|| self.error(place.into(), "its `axis` has no direction"))
+                .ok_or_else(|| {
+                    let defect = Defect::new(
+                        "its `axis` has no direction",
+                        "write three finite numbers that are not all 0",
+                    );
+                    self.error(place, defect)
+                })
         };
         Ok(match joint.type_ {
             JointType::Free => JointKind::Free,
@@ -336,7 +402,7 @@ fn larger(best: Option<f64>, next: f64) -> Option<f64> {
 }
 
 impl JointKind {
-    /// Coordinates in `qpos`.
+    /// Number of coordinates in `qpos`.
     pub fn nq(self) -> usize {
         match self {
             Self::Free => 7,
@@ -345,7 +411,7 @@ impl JointKind {
         }
     }
 
-    /// Degrees of freedom in `qvel`.
+    /// Number of coordinates in `qvel`: the degrees of freedom.
     pub fn nv(self) -> usize {
         match self {
             Self::Free => 6,

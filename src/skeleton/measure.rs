@@ -7,12 +7,12 @@ use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 impl Skeleton {
-    /// kg.
+    /// Mass of all bodies together, kg.
     pub fn total_mass(&self) -> f64 {
         self.bodies.iter().map(|b| b.mass).sum()
     }
 
-    /// Whole-body centre of mass, world frame, metres.
+    /// Centre of mass of the whole body, world frame, metres. `poses` is world from body, `[bodies]`.
     pub fn com(&self, poses: &[Isometry3<f64>]) -> Vector3<f64> {
         let moment: Vector3<f64> = self
             .bodies
@@ -26,7 +26,8 @@ impl Skeleton {
     /// Linear momentum (kg·m/s) and angular momentum about the centre of mass (kg·m²/s), world axes.
     ///
     /// L = Σ R I Rᵀ ω + m (r − c) × (v − ċ): the centroidal momentum of Orin, Goswami and Lee (Autonomous
-    /// Robots 35, 2013), each body's own spin included.
+    /// Robots 35, 2013), each body's own spin included. `poses` is world from body and `twists` are the velocities, both
+    /// `[bodies]`.
     pub fn momentum(
         &self,
         poses: &[Isometry3<f64>],
@@ -54,8 +55,8 @@ impl Skeleton {
         (linear, angular)
     }
 
-    /// Coordinates of the rest pose: joints at zero, root above the world's origin in the orientation that the
-    /// MJCF gives it, the lowest shape point on the ground.
+    /// Coordinates of the rest pose, `[nq]`: joints at zero, the root above the world's origin in the orientation that the
+    /// MJCF gives it, the lowest point of all shapes on the ground.
     pub fn rest_qpos(&self) -> Vec<f64> {
         let mut qpos = vec![0.0; self.nq];
         for body in &self.bodies {
@@ -75,8 +76,8 @@ impl Skeleton {
         qpos
     }
 
-    /// Distance from the hip joint to the sole along the leg in the rest pose, metres: the hip's height above the
-    /// ground for a character whose rest pose stands. Without leg and foot slots it is the root's height.
+    /// Distance from the hip joint to the sole along the leg in the rest pose, metres. For a character whose rest pose stands
+    /// it is the height of the hip. Without slots for a leg and its foot it is the height of the root.
     pub fn leg_length(&self) -> f64 {
         let poses = self.forward(&self.rest_qpos());
         let height = poses[0].translation.z;
@@ -91,7 +92,8 @@ impl Skeleton {
         leg.map_or(height, |(hip, foot)| self.length_along(&poses, hip, foot))
     }
 
-    /// Height of `upper`'s first joint over the lowest point of `lower`, with the line between them upright.
+    /// Height of `upper`'s first joint over the lowest point of `lower`, after the whole pose is turned so that the line
+    /// between them is upright: a rest pose need not stand.
     fn length_along(&self, poses: &[Isometry3<f64>], upper: usize, lower: usize) -> f64 {
         let joint = self.bodies[upper].joints.first();
         let anchor = joint.map_or_else(Vector3::zeros, |j| j.anchor);
@@ -103,12 +105,13 @@ impl Skeleton {
         (upright * top).z - self.lowest_point_of(&turned, &[lower])
     }
 
-    /// Height of the lowest point of all shapes, metres; of body origins if there are no shapes.
+    /// Height of the lowest point of all shapes, metres; of the bodies' origins if there are no shapes. `poses` is world from
+    /// body, `[bodies]`.
     pub fn lowest_point(&self, poses: &[Isometry3<f64>]) -> f64 {
         self.lowest(poses, 0..self.bodies.len())
     }
 
-    /// The same over some bodies only. Infinite for no bodies at all.
+    /// The same for some bodies only, given by index; infinite for none.
     pub fn lowest_point_of(&self, poses: &[Isometry3<f64>], bodies: &[usize]) -> f64 {
         self.lowest(poses, bodies.iter().copied())
     }
@@ -126,8 +129,8 @@ impl Skeleton {
         origins.fold(f64::INFINITY, f64::min)
     }
 
-    /// Points of a body's shapes that can be lowest, in the world: corners of boxes, the lower pole of spheres
-    /// and of both ends of capsules. The order is the same in every pose. The origin for a body without shapes.
+    /// Points of a body's shapes that can be the lowest, world frame, metres: the corners of boxes, and the lower poles of
+    /// spheres and of both ends of capsules. Their order is the same in every pose. A body without shapes has its origin.
     pub fn ground_points(&self, poses: &[Isometry3<f64>], body: usize) -> Vec<Vector3<f64>> {
         let pose = &poses[body];
         let shapes = &self.bodies[body].shapes;
@@ -138,14 +141,14 @@ impl Skeleton {
     }
 }
 
-/// An inertia in the axes of `pose`, turned to world axes.
+/// An inertia about a body's centre of mass, turned from the body's axes to the world's: R I Rᵀ.
 fn in_world(pose: &Isometry3<f64>, inertia: &Matrix3<f64>) -> Matrix3<f64> {
     let r = pose.rotation.to_rotation_matrix();
     r * inertia * r.transpose()
 }
 
 impl Shape {
-    /// Height of the shape's lowest point with its body at `pose`; exact.
+    /// Height of the shape's lowest point, metres, with its body at `pose` (world from body). It is exact.
     pub fn lowest(&self, pose: &Isometry3<f64>) -> f64 {
         let height = |p: &Vector3<f64>| (pose * Point3::from(*p)).z;
         match self {
@@ -153,6 +156,7 @@ impl Shape {
             Shape::Capsule { a, b, radius } => height(a).min(height(b)) - radius,
             Shape::Box { pose: own, half } => {
                 let turn = (pose.rotation * own.rotation).to_rotation_matrix();
+                // Half-extent of the box along world Z (its support function): Σ |Rzi| hi.
                 let reach: f64 = (0..3).map(|i| turn[(2, i)].abs() * half[i]).sum();
                 height(&own.translation.vector) - reach
             }
@@ -161,12 +165,12 @@ impl Shape {
 
     fn ground_points(&self, pose: &Isometry3<f64>) -> Vec<Vector3<f64>> {
         let pole = |(at, radius): (Point3<f64>, f64)| (pose * at).coords - Vector3::z() * radius;
-        self.tips().into_iter().map(pole).collect()
+        self.hull_balls().into_iter().map(pole).collect()
     }
 
-    /// The points that are the lowest in one pose or another, in the body's frame, each with the radius of a ball about
-    /// it: centres of spheres, ends of capsules, corners of boxes.
-    pub(crate) fn tips(&self) -> Vec<(Point3<f64>, f64)> {
+    /// Balls whose convex hull is the shape, as centre in the body's frame and radius, metres: the sphere itself, the two ends
+    /// of a capsule, the eight corners of a box with radius 0. On flat ground, no other points can be the lowest.
+    pub(crate) fn hull_balls(&self) -> Vec<(Point3<f64>, f64)> {
         match self {
             Shape::Sphere { center, radius } => vec![(Point3::from(*center), *radius)],
             Shape::Capsule { a, b, radius } => [a, b].map(|p| (Point3::from(*p), *radius)).into(),

@@ -1,4 +1,4 @@
-//! Joint coordinates from joint rotations and back, so that other rooms can think in rotations.
+//! Joint rotations from joint coordinates and back, so that other modules can work with rotations whatever the joints.
 
 use super::coordinates::{store, store_quaternion};
 use super::{Joint, JointKind, Skeleton};
@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 impl Skeleton {
-    /// What each body's joints turn it by, in its own rest frame: parent from body is
-    /// `rest.rotation * joint_rotations[body]`. The identity for the root and for welded bodies.
+    /// The rotation that each body's joints make, in its rest frame, `[bodies]`: the orientation of a body in its parent is
+    /// `rest.rotation * joint_rotations[body]`. The root and welded bodies have the identity.
     ///
     /// # Panics
     /// If `qpos` is shorter than [`Skeleton::nq`].
@@ -21,12 +21,12 @@ impl Skeleton {
             .collect()
     }
 
-    /// `qpos` from the root's world pose and each body's joint rotation (as [`Skeleton::joint_rotations`]).
+    /// `qpos` from the root's pose in the world and each body's joint rotation (see [`Skeleton::joint_rotations`]).
     ///
-    /// A ball joint takes the rotation as it is. Hinges take angles: one hinge the part of the rotation about
-    /// its axis; two or three the exact decomposition where there is one. Of several solutions the one stands
-    /// that keeps the limits, or is nearest to them, and then is nearest to `near` (a `qpos`, such as the frame
-    /// before) or to zero. Slides stay at zero.
+    /// A ball joint takes the rotation as it is. One hinge takes the part of the rotation about its axis; two or three
+    /// hinges take the angles of the exact decomposition where one exists. Of several solutions the best is the one that
+    /// keeps the limits, or comes nearest to keeping them, and among those the one nearest to `near` (a `qpos`, such as that
+    /// of the frame before) or else to zero. Slides stay at zero.
     ///
     /// # Panics
     /// If `rotations` is shorter than the number of bodies, or `near` than [`Skeleton::nq`].
@@ -64,6 +64,7 @@ impl Skeleton {
 }
 
 impl Joint {
+    /// The axis of a hinge.
     fn axis(&self) -> Option<Vector3<f64>> {
         match self.kind {
             JointKind::Hinge(axis) => Some(axis),
@@ -72,7 +73,7 @@ impl Joint {
     }
 }
 
-/// Of a quaternion and its negative, the one nearer to the quaternion in `near`.
+/// `rotation` or its negative, which is the same rotation: whichever is nearer to the quaternion in `near`.
 fn same_side(
     rotation: &UnitQuaternion<f64>,
     near: Option<&[f64]>,
@@ -87,7 +88,7 @@ fn same_side(
     }
 }
 
-/// Angles of the first three of `hinges` that make `rotation`, best of all solutions.
+/// Angles of the first three of `hinges` that make `rotation`: the best of all solutions.
 fn hinge_angles(
     hinges: &[&Joint],
     rotation: &UnitQuaternion<f64>,
@@ -108,6 +109,7 @@ fn hinge_angles(
         [e1, e2, e3, ..] => davenport(e1, e2, e3, rotation, wanted[0]),
     };
     let mut best = (f64::INFINITY, wanted.clone());
+    // Each solution may be shifted by whole turns; the shift nearest to the wanted angles is the one to judge.
     for candidate in candidates {
         let turns = |i: usize| candidate[i] + TAU * ((wanted[i] - candidate[i]) / TAU).round();
         let angles: Vec<f64> = (0..axes.len()).map(turns).collect();
@@ -119,7 +121,8 @@ fn hinge_angles(
     best.1
 }
 
-/// Being outside the limits outweighs being away from the wanted angles.
+/// How bad a solution is: squared distances from the wanted angles, and a hundred times those from the limits (chosen, so
+/// that a solution inside the limits wins unless it is ten times as far from the wanted angles).
 fn cost(hinges: &[&Joint], angles: &[f64], wanted: &[f64]) -> f64 {
     let each = hinges.iter().zip(angles.iter().zip(wanted));
     each.map(|(joint, (angle, wanted))| {
@@ -130,17 +133,20 @@ fn cost(hinges: &[&Joint], angles: &[f64], wanted: &[f64]) -> f64 {
     .sum()
 }
 
-/// Angle of the part of `rotation` that is about `axis` (swing-twist decomposition), in (−π, π].
+/// Angle of the part of `rotation` about the unit vector `axis` (swing-twist decomposition), radians, in [−π, π].
 pub(crate) fn twist(rotation: &UnitQuaternion<f64>, axis: &Vector3<f64>) -> f64 {
     let half = rotation.imag().dot(axis).atan2(rotation.w);
     let angle = 2.0 * half;
     angle - TAU * (angle / TAU).round()
 }
 
-/// Both solutions of R₁(a) R₂(b) R₃(c) = `rotation` for turns about unit axes e1, e2, e3, which need not be
+/// Both solutions of R₁(a) R₂(b) R₃(c) = `rotation` for rotations about the unit axes e1, e2, e3, which need not be
 /// orthogonal: generalised Euler angles after Davenport (Wertz, Spacecraft Attitude Determination and Control,
-/// 1978, app. E). e1·R e3 depends on b alone, which gives b, then a, then c. Where no solution exists (the axes
-/// don't span all rotations) it is the nearest b. With e1 and e3 aligned a is `free`.
+/// 1978, app. E).
+///
+/// e1·R e3 depends on b alone: it is a constant plus |(cos, sin)| · cos(b − atan2(sin, cos)), which has two solutions for b.
+/// Each gives a, then c. Where the axes can't make the rotation, b is the nearest. Where R e3 lies along e1, only the sum
+/// of a and c counts, and a is `free`.
 fn davenport(
     e1: Vector3<f64>,
     e2: Vector3<f64>,
@@ -148,6 +154,7 @@ fn davenport(
     rotation: &UnitQuaternion<f64>,
     free: f64,
 ) -> Vec<[f64; 3]> {
+    // Two hinges about one axis leave a third axis without direction: they act as one.
     let Some(e3) = e3.try_normalize(1e-9) else {
         return vec![[twist(rotation, &e1), 0.0, 0.0]];
     };
@@ -155,6 +162,7 @@ fn davenport(
     let (cos, sin) = (e1.dot(&e3) - constant, e1.dot(&e2.cross(&e3)));
     let size = cos.hypot(sin);
     let reach = e1.dot(&(rotation * e3)) - constant;
+    // Clamped: rounding, or a rotation out of reach, may ask for a cosine beyond ±1.
     let spread = if size > 1e-12 {
         (reach / size).clamp(-1.0, 1.0).acos()
     } else {
@@ -170,6 +178,7 @@ fn davenport(
     vec![solve(middle + spread), solve(middle - spread)]
 }
 
+/// Rotation by `angle` about a unit axis.
 fn about(axis: &Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(axis * angle)
 }

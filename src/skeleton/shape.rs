@@ -1,6 +1,7 @@
-//! MJCF geoms as solids: their mass properties exactly, their contact shape as sphere, capsule or box.
+//! MJCF geoms as solids, with exact mass properties, and the sphere, capsule or box that stands for each in contacts.
 
 use super::Shape;
+use super::error::Defect;
 use mjcf_rs::Pose;
 use mjcf_rs::body::{Geom, GeomType};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -9,7 +10,8 @@ use std::f64::consts::PI;
 /// Density of a geom that states neither mass nor density, kg/m³ (MuJoCo's default).
 const DEFAULT_DENSITY: f64 = 1000.0;
 
-/// A geom's form in its own frame. Heights are half-lengths along z.
+/// The form of a geom in its own frame, metres. Capsules and cylinders lie along z, `half` being half their length without
+/// the caps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Form {
     Sphere { radius: f64 },
@@ -23,9 +25,13 @@ enum Form {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Solid {
     form: Form,
+    /// Body from geom.
     pub(super) pose: Isometry3<f64>,
+    /// kg.
     pub(super) mass: f64,
+    /// Whether it takes part in contacts, or is only drawn and weighed.
     pub(super) collides: bool,
+    /// Sliding friction coefficient.
     pub(super) friction: f64,
 }
 
@@ -37,8 +43,8 @@ pub(super) fn isometry(pose: &Pose) -> Isometry3<f64> {
 }
 
 impl Solid {
-    /// `None` for planes and height fields, which are scenery.
-    pub(super) fn from_geom(geom: &Geom) -> Result<Option<Self>, String> {
+    /// The solid of a geom; `None` for planes and height fields, which are scenery.
+    pub(super) fn from_geom(geom: &Geom) -> Result<Option<Self>, Defect> {
         if matches!(geom.type_, GeomType::Plane | GeomType::Hfield) {
             return Ok(None);
         }
@@ -49,12 +55,16 @@ impl Solid {
             None => form.volume() * geom.density.unwrap_or(DEFAULT_DENSITY),
         };
         if !(mass >= 0.0 && mass.is_finite()) {
-            return Err(format!("its mass {mass} has to be finite and not negative"));
+            return Err(Defect::new(
+                format!("its mass {mass} is negative or not finite"),
+                "write a finite mass that is not negative",
+            ));
         }
         Ok(Some(Self {
             form,
             pose,
             mass,
+            // MuJoCo: a geom with neither bit can touch nothing.
             collides: geom.contype != 0 || geom.conaffinity != 0,
             friction: geom.friction[0],
         }))
@@ -67,8 +77,8 @@ impl Solid {
         r * Matrix3::from_diagonal(&principal) * r.transpose()
     }
 
-    /// Contact shape. A cylinder becomes a capsule of the same length (a disc becomes a box), an ellipsoid a
-    /// capsule along its longest axis.
+    /// The shape that stands for it in contacts. A cylinder becomes a capsule of the same length, or a box if it is wider than
+    /// long. An ellipsoid becomes a capsule along its longest axis, as thick as the geometric mean of the other two.
     pub(super) fn shape(&self) -> Shape {
         let center = self.pose.translation.vector;
         match self.form {
@@ -106,15 +116,19 @@ impl Solid {
     }
 }
 
-/// Pose and size with `fromto` resolved as MuJoCo does: the segment sets centre, z axis and half-length.
-fn placed(geom: &Geom) -> Result<(Isometry3<f64>, [f64; 3]), String> {
+/// Pose and size of a geom, with `fromto` resolved as in MuJoCo: the segment sets centre, z axis and half-length.
+fn placed(geom: &Geom) -> Result<(Isometry3<f64>, [f64; 3]), Defect> {
     let Some([ax, ay, az, bx, by, bz]) = geom.fromto else {
         return Ok((isometry(&geom.pose), geom.size));
     };
     let (a, b) = (Vector3::new(ax, ay, az), Vector3::new(bx, by, bz));
+    // MuJoCo's z axis points from the second point to the first.
     let axis = a - b;
     if !(axis.norm() > 1e-9 && axis.norm().is_finite()) {
-        return Err("its `fromto` needs two different points".into());
+        return Err(Defect::new(
+            "the two points of its `fromto` are the same or not finite",
+            "write two different points",
+        ));
     }
     let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &axis)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
@@ -128,21 +142,23 @@ fn placed(geom: &Geom) -> Result<(Isometry3<f64>, [f64; 3]), String> {
     Ok((pose, size))
 }
 
-fn form(kind: GeomType, size: [f64; 3]) -> Result<Form, String> {
+fn form(kind: GeomType, size: [f64; 3]) -> Result<Form, Defect> {
     let used = match kind {
         GeomType::Sphere => 1,
         GeomType::Capsule | GeomType::Cylinder => 2,
         GeomType::Ellipsoid | GeomType::Box => 3,
         _ => {
-            return Err(
-                "only sphere, capsule, cylinder, ellipsoid and box geoms are supported: give the \
-                 body an <inertial> and simple collision geoms"
-                    .into(),
-            );
+            return Err(Defect::new(
+                "only sphere, capsule, cylinder, ellipsoid and box geoms are supported",
+                "give the body an <inertial>, and collision geoms of these types",
+            ));
         }
     };
     if size.iter().take(used).any(|s| !(*s > 0.0 && s.is_finite())) {
-        return Err(format!("its `size` needs {used} positive numbers"));
+        return Err(Defect::new(
+            "a number of its `size` is missing, not positive or not finite",
+            format!("write {used} positive number(s)"),
+        ));
     }
     let [a, b, c] = size;
     Ok(match kind {
@@ -159,7 +175,7 @@ fn form(kind: GeomType, size: [f64; 3]) -> Result<Form, String> {
 }
 
 impl Form {
-    /// m³.
+    /// Volume, m³.
     fn volume(self) -> f64 {
         match self {
             Form::Sphere { radius } => 4.0 / 3.0 * PI * radius.powi(3),
@@ -172,7 +188,7 @@ impl Form {
         }
     }
 
-    /// Principal moments of a homogeneous solid of 1 kg (standard formulas, e.g. Goldstein, Classical Mechanics).
+    /// Principal moments of inertia of a homogeneous solid of 1 kg, m²: the formulas of any table of moments of inertia.
     fn unit_inertia(self) -> Vector3<f64> {
         match self {
             Form::Sphere { radius } => Vector3::repeat(0.4 * radius.powi(2)),
@@ -187,10 +203,13 @@ impl Form {
     }
 }
 
-/// A cylinder of length `length` with a half ball on each end; each half ball's centroid lies 3/8 of the radius
-/// beyond the cylinder's end.
+/// Principal moments of a capsule of 1 kg: a cylinder of length `length` with a half ball on each end.
+///
+/// The two half balls together have a ball's 2/5 r² about the cylinder's end. The centroid of each lies 3/8 r beyond that
+/// end, so moving it out by l/2 adds l²/4 + 2 · l/2 · 3/8 r (parallel axis theorem, twice).
 fn capsule_inertia(radius: f64, length: f64) -> Vector3<f64> {
     let (r2, l2) = (radius.powi(2), length.powi(2));
+    // Share of the ball's volume, 4/3 π r³ to 4/3 π r³ + π r² l.
     let ball = 4.0 * radius / (4.0 * radius + 3.0 * length);
     let tube = 1.0 - ball;
     let along = tube * r2 / 2.0 + ball * 0.4 * r2;
@@ -199,6 +218,7 @@ fn capsule_inertia(radius: f64, length: f64) -> Vector3<f64> {
     Vector3::new(across, across, along)
 }
 
+/// (y² + z², x² + z², x² + y²).
 fn sums_of_others(v: &Vector3<f64>) -> Vector3<f64> {
     let s = v.component_mul(v);
     Vector3::new(s.y + s.z, s.x + s.z, s.x + s.y)

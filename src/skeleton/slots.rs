@@ -1,5 +1,6 @@
-//! Which body stands for which humanoid slot: from the JSON beside the MJCF, or by the bodies' names.
+//! Which body takes which humanoid slot: read from the JSON beside the MJCF, or guessed from the names of the bodies.
 
+use super::error::Defect;
 use super::{Body, Skeleton};
 use crate::humanoid::Slot;
 use serde::Deserialize;
@@ -10,20 +11,29 @@ struct SlotFile {
     slots: BTreeMap<Slot, String>,
 }
 
-/// Reads `{"slots": {"hips": "pelvis", …}}`.
-pub(super) fn from_json(text: &str, bodies: &[Body]) -> Result<BTreeMap<Slot, usize>, String> {
-    let file: SlotFile = serde_json::from_str(text).map_err(|e| e.to_string())?;
+/// Reads `{"slots": {"hips": "pelvis", …}}`: the body of each slot.
+pub(super) fn from_json(text: &str, bodies: &[Body]) -> Result<BTreeMap<Slot, usize>, Defect> {
+    let file: SlotFile = serde_json::from_str(text).map_err(|e| {
+        Defect::new(
+            format!("they cannot be read ({e})"),
+            r#"write them as {"slots": {"hips": "pelvis"}}"#,
+        )
+    })?;
     file.slots
         .into_iter()
         .map(|(slot, name)| {
             let body = bodies.iter().position(|b| b.name == name);
-            body.map(|b| (slot, b))
-                .ok_or_else(|| format!("no body is called `{name}`"))
+            body.map(|b| (slot, b)).ok_or_else(|| {
+                Defect::new(
+                    format!("no body is called `{name}`"),
+                    "use names of bodies of the MJCF file",
+                )
+            })
         })
         .collect()
 }
 
-/// Guesses from body names; of several bodies for one slot the first stands.
+/// Guesses slots from the names of the bodies. Of several bodies for one slot, the first takes it.
 pub(super) fn from_names(bodies: &[Body]) -> BTreeMap<Slot, usize> {
     let mut slots = BTreeMap::new();
     for (index, body) in bodies.iter().enumerate() {
@@ -34,6 +44,7 @@ pub(super) fn from_names(bodies: &[Body]) -> BTreeMap<Slot, usize> {
     slots
 }
 
+/// The slot that a name stands for in common rigs: MuJoCo's humanoid, DeepMimic's, and motion capture.
 fn slot_of_name(name: &str) -> Option<Slot> {
     let name = name.to_lowercase().replace(['-', '.', ' '], "_");
     let (side, part) = split_side(&name);
@@ -95,7 +106,7 @@ fn limb(part: &str) -> Option<(Slot, Slot)> {
 }
 
 impl Skeleton {
-    /// The humanoid slots as the JSON text that [`Skeleton::from_mjcf`] reads.
+    /// The humanoid slots as JSON text, in the form that [`Skeleton::from_mjcf`] reads.
     pub fn slots_json(&self) -> String {
         let slots: BTreeMap<Slot, &str> = self
             .slots

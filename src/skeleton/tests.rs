@@ -1,4 +1,5 @@
 use super::*;
+use crate::explain::{Explain, Fault, Parameter};
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 
 fn humanoid() -> Skeleton {
@@ -254,10 +255,38 @@ fn errors_say_where_and_what() {
     ];
     for (xml, expected) in cases {
         let error = Skeleton::from_mjcf("bad", &xml, None).expect_err(&xml);
+        let told = error.explain();
+        assert_eq!(told.fault, Fault::Input, "{error}");
         assert!(error.to_string().contains(expected), "{error}");
+        assert!(told.place.is_some_and(|p| p.contains("`bad`")), "{error}");
+        assert!(
+            told.remedy.is_some_and(|r| r.parameter.is_none()),
+            "{error}"
+        );
     }
     let unknown = Skeleton::load("nobody").expect_err("no such skeleton");
-    assert!(unknown.to_string().contains("humanoid"));
+    let remedy = unknown.explain().remedy.expect("what to do instead");
+    assert!(remedy.advice.contains("humanoid"), "{unknown}");
+    assert_eq!(remedy.parameter, Some(Parameter::Skeleton));
+}
+
+/// A character that is read from a file is named by its file, and its slots by theirs.
+#[test]
+fn errors_name_the_file_that_is_wrong() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let (xml, json) = (folder.path().join("a.xml"), folder.path().join("a.json"));
+    let file = || {
+        Skeleton::load(&xml)
+            .expect_err("it is wrong")
+            .explain()
+            .file
+    };
+    assert_eq!(file(), Some(xml.clone()), "it isn't there");
+    std::fs::write(&xml, "<mujoco>").expect("it can be written");
+    assert_eq!(file(), Some(xml.clone()), "it is cut off");
+    std::fs::write(&xml, humanoid().mjcf).expect("it can be written");
+    std::fs::write(&json, r#"{"slots": {"hips": "tail"}}"#).expect("it can be written");
+    assert_eq!(file(), Some(json.clone()), "it names no body");
 }
 
 /// A file damaged anywhere gives a skeleton or an error.

@@ -176,7 +176,10 @@ fn what_cannot_be_done_is_refused_with_a_remedy() {
             &["edit", "walk.clip", "--blend", "0.2"],
             "nothing to blend; ",
         ),
-        (&["edit", "walk.clip", "--trim", "5..6"], "choose a part within"),
+        (
+            &["edit", "walk.clip", "--trim", "5..6"],
+            "choose a part within",
+        ),
         (
             &["edit", "walk.clip", "--loop", "--shortest", "9"],
             "allow shorter ones",

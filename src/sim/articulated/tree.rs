@@ -124,7 +124,7 @@ impl Tree {
 }
 
 fn node(link: &Link, first: usize, path: Vec<usize>) -> Node {
-    let tips = link.shapes.iter().flat_map(Shape::tips);
+    let tips = link.shapes.iter().flat_map(Shape::hull_balls);
     let points: Vec<(Vector3<f32>, f32)> = tips
         .map(|(at, radius)| (at.coords.cast(), radius as f32))
         .collect();
