@@ -1,4 +1,4 @@
-//! The table of `docs/formats.md`: what becomes of every file of the collection that may lie beside the repository.
+//! The table of `docs/tried-files.md`: what becomes of every file of the collection that may lie beside the repository.
 //!
 //! `MIMIC_WRITE_DOCS=1` writes it. Without the feature `ufbx`, some of these files are refused and the table is another.
 
@@ -8,7 +8,7 @@ use mimic::import::{self, Inspection, Options};
 use mimic_test_support::foreign;
 use std::path::{Path, PathBuf};
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/formats.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tried-files.md");
 /// The table stands behind this line.
 const MARK: &str = "<!-- Written by tests/import/formats.rs: MIMIC_WRITE_DOCS=1 -->\n";
 
@@ -110,7 +110,7 @@ fn the_page_says_what_becomes_of_every_file() {
     let differing = table.lines().zip(written.lines()).find(|(a, b)| a != b);
     assert_eq!(
         differing, None,
-        "MIMIC_WRITE_DOCS=1 writes docs/formats.md anew"
+        "MIMIC_WRITE_DOCS=1 writes docs/tried-files.md anew"
     );
     assert_eq!(table, written);
 }
