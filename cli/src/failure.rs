@@ -1,5 +1,7 @@
 //! What can end a command early, and the exit code it ends with.
 
+use mimic::clip;
+use mimic::explain::{Explain, Fault};
 use mimic::motion::MotionError;
 use std::fmt::Display;
 use std::io;
@@ -57,12 +59,27 @@ impl Failure {
         Self::input(path, format!("cannot be read ({cause}); {CHECK}"))
     }
 
+    /// An error of the library, which says itself whose fault it is.
+    pub fn explained(error: &dyn Explain) -> Self {
+        let told = error.explain();
+        match told.fault {
+            Fault::Input => Self::user(told),
+            Fault::Work => Self::work(told),
+        }
+    }
+
+    /// An error about the clip file `path`.
+    pub fn clip(path: &Path, cause: clip::Error) -> Self {
+        match cause {
+            clip::Error::File(error) => Self::explained(&error),
+            cause => Self::input(path, cause),
+        }
+    }
+
+    /// An error about the motion file `path`.
     pub fn motion(path: &Path, cause: MotionError) -> Self {
         match cause {
-            MotionError::Read { path, source } => Self::unreadable(&path, &source),
-            MotionError::Format { ref message, .. } if !message.contains("; ") => {
-                Self::input(path, format!("{cause}; retarget its clip again"))
-            }
+            MotionError::File(error) => Self::explained(&error),
             cause => Self::input(path, cause),
         }
     }

@@ -133,7 +133,7 @@ impl Preparation {
         let file = &self.file;
         if locate::has_extension(file, "clip") {
             self.import.refuse_for(file, "a clip")?;
-            return Clip::load(file).map_err(|e| Failure::input(file, e));
+            return Clip::load(file).map_err(|e| Failure::clip(file, e));
         }
         import::load(file, &self.import.options()).map_err(|e| Failure::input(file, e))
     }

@@ -7,7 +7,7 @@ use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::clip::LoopMode;
 use mimic::evaluate::{self, Evaluation, Opening, Options, Trace};
-use mimic::learn::{FileError, LearnError, Performer, Run, RunError, TrainError};
+use mimic::learn::{LearnError, Performer, Run, RunError, TrainError};
 use mimic::motion::MotionError;
 use mimic::task::Perturbations;
 use serde::Serialize;
@@ -189,9 +189,10 @@ pub fn failure(error: RunError) -> Failure {
     match error {
         RunError::Learn(error) | RunError::Train(TrainError::Learn(error)) => learn_failure(error),
         RunError::Io { action: "read", .. } => Failure::user(error),
-        RunError::Io { .. }
-        | RunError::File(FileError::Io { verb: "write", .. })
-        | RunError::Motion(MotionError::Write { .. }) => Failure::work(error),
+        RunError::Io { .. } => Failure::work(error),
+        RunError::File(error) | RunError::Motion(MotionError::File(error)) => {
+            Failure::explained(&error)
+        }
         error => Failure::user(error),
     }
 }
@@ -225,6 +226,7 @@ pub fn use_threads(threads: Option<usize>) -> Outcome<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mimic::file::{FileError, Flaw, Format};
 
     fn code(failure: &Failure) -> u8 {
         match failure {
@@ -236,18 +238,20 @@ mod tests {
 
     #[test]
     fn what_cannot_be_written_or_ran_away_is_failed_work() {
-        let io = |verb| FileError::Io {
-            verb,
+        let denied = || std::io::ErrorKind::PermissionDenied.into();
+        let file = |flaw| FileError {
             path: "run/policy.safetensors".into(),
-            source: std::io::ErrorKind::PermissionDenied.into(),
+            format: Format {
+                name: "policy",
+                version: 1,
+                remedy: "train it again",
+            },
+            flaw,
         };
-        assert_eq!(code(&failure(io("write").into())), 1);
-        assert_eq!(code(&failure(io("read").into())), 2);
-        let motion = MotionError::Write {
-            path: "run/reference-0.motion".into(),
-            message: "no space".into(),
-        };
-        assert_eq!(code(&failure(motion.into())), 1);
+        let (write, read) = (|| file(Flaw::Write(denied())), file(Flaw::Read(denied())));
+        assert_eq!(code(&failure(write().into())), 1);
+        assert_eq!(code(&failure(read.into())), 2);
+        assert_eq!(code(&failure(MotionError::from(write()).into())), 1);
         let wild = LearnError::NotFinite {
             what: "rewards",
             sample: 3,

@@ -1,33 +1,14 @@
 //! What can go wrong with a clip and its file.
 
 use crate::explain::{Explain, Explanation, Parameter, explained};
-use std::path::{Path, PathBuf};
+use crate::file::FileError;
 
 /// Why a clip couldn't be read, written or edited.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// The system didn't give the file.
-    Read {
-        /// The clip file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The system didn't take the file.
-    Write {
-        /// The clip file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file isn't a clip, or holds one that can't be.
-    Broken {
-        /// The clip file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
+    /// The clip's file can't be written, read or used.
+    File(FileError),
     /// A frame rate that can't be sampled.
     Rate {
         /// Frames per second.
@@ -117,12 +98,9 @@ pub enum Error {
 
 explained!(Error);
 
-impl Error {
-    pub(crate) fn broken(path: &Path, reason: impl Into<String>) -> Self {
-        Self::Broken {
-            path: path.to_owned(),
-            reason: reason.into(),
-        }
+impl From<FileError> for Error {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
     }
 }
 
@@ -130,17 +108,7 @@ impl Explain for Error {
     fn explain(&self) -> Explanation {
         let wrong = |cause: String| Explanation::input(cause);
         match self {
-            Self::Read { path, source } => wrong(format!("cannot be read ({source})"))
-                .file(path)
-                .remedy("check the path and its permissions"),
-            Self::Write { path, source } => {
-                Explanation::work(format!("cannot be written ({source})"))
-                    .file(path)
-                    .remedy("check the path, its permissions and the room there")
-            }
-            Self::Broken { path, reason } => wrong(format!("not a usable clip: {reason}"))
-                .file(path)
-                .remedy("import it again"),
+            Self::File(error) => error.explain(),
             Self::Rate { fps } => {
                 wrong(format!("{fps} frames per second is not a usable frame rate"))
                     .remedy_by(Parameter::FrameRate, "give a positive number up to 10000")

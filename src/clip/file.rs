@@ -3,30 +3,30 @@
 //! Tensors, for J joints and F frames: `parent` i32 \[J\] (−1 for a root), `rest_translation` f32 \[J, 3\],
 //! `rest_rotation` f32 \[J, 4\], `local_translation` f32 \[F, J, 3\], `local_rotation` f32 \[F, J, 4\]; and of a part of
 //! a take `before_translation`, `before_rotation`, `after_translation`, `after_rotation`, alike. Metres, and
-//! quaternions w, x, y, z. The metadata key `mimic` holds the JSON object [`Header`], in which `humanoid` is there only
-//! where the source says which joint is which bone.
+//! quaternions w, x, y, z. The metadata has the fields of [`Header`], of which `humanoid` is there
+//! only where the source says which joint is which bone.
 
 use super::sampling::{MOST_FPS, MOST_TRANSFORMS};
 use super::{Clip, Error, Joint, LoopMode, Margin, Problem, Source};
+use crate::file::{self, Flaw, Format, Reader, Writer};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::path::Path;
 
-const FORMAT: &str = "clip";
-const VERSION: u32 = 1;
-const KEY: &str = "mimic";
+const FORMAT: Format = Format {
+    name: "clip",
+    version: 1,
+    remedy: "import it again",
+};
+/// Names of the two tensors of the clip's own frames, and of those before and after them.
 const LOCAL: [&str; 2] = ["local_translation", "local_rotation"];
 const BEFORE: [&str; 2] = ["before_translation", "before_rotation"];
 const AFTER: [&str; 2] = ["after_translation", "after_rotation"];
-/// Largest clip file that is read, in bytes.
-const MOST_BYTES: u64 = 4 << 30;
 
+/// The metadata of a clip file.
 #[derive(Serialize, Deserialize)]
 struct Header {
-    format: String,
-    version: u32,
     name: String,
     fps: f64,
     joints: Vec<String>,
@@ -39,41 +39,23 @@ struct Header {
     problems: Vec<Problem>,
 }
 
-/// What every version of the header has, read first so that a later version is named and not called broken.
-#[derive(Deserialize)]
-struct Stamp {
-    format: String,
-    version: u32,
-}
-
 impl Clip {
-    /// Writes the clip file `path`, or leaves what was there untouched.
+    /// Writes the clip file `path`, or leaves what was there untouched. Transforms are rounded to `f32`.
+    ///
+    /// # Errors
+    /// [`Error::File`] when the file can't be written, or the clip has frames of another number of joints.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
-        let io = |source| Error::Write {
-            path: path.to_owned(),
-            source,
-        };
-        let bytes = self.to_bytes().map_err(|e| Error::broken(path, e))?;
-        crate::file::replace(path, &bytes).map_err(io)
+        let writer = self.writer().map_err(|flaw| flaw.of(path, FORMAT))?;
+        Ok(writer.save(path, FORMAT, &self.header())?)
     }
 
     /// Reads the clip file `path`.
+    ///
+    /// # Errors
+    /// [`Error::File`] when the file can't be read, or is no whole clip of this version or an older one.
     pub fn load(path: impl AsRef<Path>) -> Result<Clip, Error> {
-        let path = path.as_ref();
-        let io = |source| Error::Read {
-            path: path.to_owned(),
-            source,
-        };
-        let size = std::fs::metadata(path).map_err(io)?.len();
-        if size > MOST_BYTES {
-            return Err(Error::broken(
-                path,
-                format!("{size} bytes are more than {MOST_BYTES}"),
-            ));
-        }
-        let bytes = std::fs::read(path).map_err(io)?;
-        Clip::from_bytes(&bytes).map_err(|e| Error::broken(path, e))
+        Ok(file::load(path.as_ref(), FORMAT, Clip::from_bytes)?)
     }
 
     /// Rounds all transforms to what the clip's file can hold, so that a clip is the same whether it comes from a file
@@ -86,11 +68,8 @@ impl Clip {
         }
     }
 
-    /// The bytes of the clip's file.
-    fn to_bytes(&self) -> Result<Vec<u8>, String> {
-        let header = Header {
-            format: FORMAT.to_owned(),
-            version: VERSION,
+    fn header(&self) -> Header {
+        Header {
             name: self.name.clone(),
             fps: self.fps,
             joints: self.joints.iter().map(|joint| joint.name.clone()).collect(),
@@ -98,65 +77,49 @@ impl Clip {
             loop_mode: self.loop_mode,
             source: self.source.clone(),
             problems: self.problems.clone(),
-        };
-        let header = serde_json::to_string(&header).map_err(|e| e.to_string())?;
-        let j = self.joints.len();
-        let rest = || self.joints.iter().map(|joint| &joint.rest);
-        let mut tensors = vec![
-            ("parent", Dtype::I32, vec![j], parents(&self.joints)?),
-            (
-                "rest_translation",
-                Dtype::F32,
-                vec![j, 3],
-                translations(rest()),
-            ),
-            ("rest_rotation", Dtype::F32, vec![j, 4], rotations(rest())),
-        ];
-        let Margin { before, after } = &self.margin;
-        tensors.extend(frames(LOCAL, j, &self.frames));
-        if !before.is_empty() {
-            tensors.extend(frames(BEFORE, j, before));
         }
-        if !after.is_empty() {
-            tensors.extend(frames(AFTER, j, after));
-        }
-        let mut views = Vec::new();
-        for (name, dtype, shape, bytes) in &tensors {
-            let view = TensorView::new(*dtype, shape.clone(), bytes).map_err(|e| e.to_string())?;
-            views.push((*name, view));
-        }
-        let metadata = HashMap::from([(KEY.to_owned(), header)]);
-        safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
     }
 
-    /// The clip that a file's bytes hold, or what is wrong with them.
-    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Clip, String> {
-        let tensors =
-            SafeTensors::deserialize(bytes).map_err(|e| format!("not safetensors ({e})"))?;
-        let header = header(bytes)?;
-        let j = header.joints.len();
-        let parent = values::<4>(&tensors, "parent", Dtype::I32, &[Some(j)])?;
-        let frames = read_frames(&tensors, LOCAL, j)?;
-        if frames.is_empty() {
-            return Err("0 frames".to_owned());
+    fn writer(&self) -> Result<Writer, Flaw> {
+        let mut writer = Writer::default();
+        let j = self.joints.len();
+        writer.push("parent", &[j], parents(&self.joints)?);
+        let rest = || self.joints.iter().map(|joint| &joint.rest);
+        writer.push("rest_translation", &[j, 3], translations(rest()));
+        writer.push("rest_rotation", &[j, 4], rotations(rest()));
+        let Margin { before, after } = &self.margin;
+        push_frames(&mut writer, LOCAL, j, &self.frames);
+        for (names, frames) in [(BEFORE, before), (AFTER, after)] {
+            if !frames.is_empty() {
+                push_frames(&mut writer, names, j, frames);
+            }
         }
-        let around = |names: [&str; 2]| match tensors.tensor(names[0]) {
-            Ok(_) => read_frames(&tensors, names, j),
-            Err(_) => Ok(Vec::new()),
+        Ok(writer)
+    }
+
+    /// The clip that a file's bytes hold.
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Clip, Flaw> {
+        let reader = Reader::open(bytes, FORMAT)?;
+        let header = header(&reader)?;
+        let j = header.joints.len();
+        let joints = joints(&reader, header.joints, header.humanoid)?;
+        let frames = read_frames(&reader, LOCAL, j)?;
+        if frames.is_empty() {
+            return Err(Flaw::content(tensor(LOCAL[0]), "0 frames"));
+        }
+        let around = |names: [&str; 2]| match reader.has(names[0]) {
+            true => read_frames(&reader, names, j),
+            false => Ok(Vec::new()),
         };
         let margin = Margin {
             before: around(BEFORE)?,
             after: around(AFTER)?,
         };
-        let rest_translation = floats(&tensors, "rest_translation", &[Some(j), Some(3)])?;
-        let rest_rotation = floats(&tensors, "rest_rotation", &[Some(j), Some(4)])?;
-        let rest = isometries("rest_rotation", &rest_translation, &rest_rotation)?;
-        let parent: Vec<i32> = parent.into_iter().map(i32::from_le_bytes).collect();
         Ok(Clip {
             name: header.name,
             fps: header.fps,
             loop_mode: header.loop_mode,
-            joints: joints(header.joints, header.humanoid, &parent, rest)?,
+            joints,
             frames,
             margin,
             source: header.source,
@@ -165,60 +128,47 @@ impl Clip {
     }
 }
 
-type Tensor = (&'static str, Dtype, Vec<usize>, Vec<u8>);
+/// The metadata, as far as it can be checked without the tensors.
+fn header(reader: &Reader) -> Result<Header, Flaw> {
+    let header: Header = reader.fields()?;
+    if header.joints.is_empty() {
+        return Err(Flaw::content("joints", "no joints"));
+    }
+    if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
+        let cause = format!("a rate of {} frames per second", header.fps);
+        return Err(Flaw::content("fps", cause));
+    }
+    Ok(header)
+}
 
-/// Two tensors of frames of `j` joints.
-fn frames(
-    [places, turns]: [&'static str; 2],
+/// Adds two tensors of frames of `j` joints.
+fn push_frames(
+    writer: &mut Writer,
+    [places, turns]: [&str; 2],
     j: usize,
     frames: &[Vec<Isometry3<f64>>],
-) -> [Tensor; 2] {
+) {
     let (f, local) = (frames.len(), || frames.iter().flatten());
-    [
-        (places, Dtype::F32, vec![f, j, 3], translations(local())),
-        (turns, Dtype::F32, vec![f, j, 4], rotations(local())),
-    ]
+    writer.push(places, &[f, j, 3], translations(local()));
+    writer.push(turns, &[f, j, 4], rotations(local()));
 }
 
 /// The frames of `j` joints that two tensors hold.
 fn read_frames(
-    tensors: &SafeTensors<'_>,
+    reader: &Reader,
     [places, turns]: [&str; 2],
     j: usize,
-) -> Result<Vec<Vec<Isometry3<f64>>>, String> {
-    let translation = floats(tensors, places, &[None, Some(j), Some(3)])?;
+) -> Result<Vec<Vec<Isometry3<f64>>>, Flaw> {
+    let translation = floats(reader, places, &[None, Some(j), Some(3)])?;
     let f = translation.len() / (3 * j);
     if f.saturating_mul(j) > MOST_TRANSFORMS {
-        return Err(format!("{f} frames of {j} joints"));
+        let cause =
+            format!("{f} frames of {j} joints, at most {MOST_TRANSFORMS} transforms are read");
+        return Err(Flaw::content(tensor(places), cause));
     }
-    let rotation = floats(tensors, turns, &[Some(f), Some(j), Some(4)])?;
+    let rotation = floats(reader, turns, &[Some(f), Some(j), Some(4)])?;
     let local = isometries(turns, &translation, &rotation)?;
     Ok(local.chunks_exact(j).map(<[_]>::to_vec).collect())
-}
-
-fn header(bytes: &[u8]) -> Result<Header, String> {
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let text = metadata.metadata().as_ref().and_then(|m| m.get(KEY));
-    let text = text.ok_or_else(|| format!("no `{KEY}` in the metadata"))?;
-    let broken = |e: serde_json::Error| format!("metadata: {e}");
-    let stamp: Stamp = serde_json::from_str(text).map_err(broken)?;
-    if stamp.format != FORMAT {
-        return Err(format!("a `{}` file where a clip is wanted", stamp.format));
-    }
-    if stamp.version != VERSION {
-        return Err(format!(
-            "clip version {} where {VERSION} is the latest known",
-            stamp.version
-        ));
-    }
-    let header: Header = serde_json::from_str(text).map_err(broken)?;
-    if header.joints.is_empty() {
-        return Err("no joints".to_owned());
-    }
-    if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
-        return Err(format!("a rate of {} frames per second", header.fps));
-    }
-    Ok(header)
 }
 
 /// Joints by the bone that each is said to be.
@@ -229,75 +179,43 @@ fn bones(joints: &[Joint]) -> BTreeMap<String, usize> {
         .collect()
 }
 
-fn parents(joints: &[Joint]) -> Result<Vec<u8>, String> {
-    let mut bytes = Vec::with_capacity(4 * joints.len());
-    for joint in joints {
-        let parent = match joint.parent {
-            Some(p) => {
-                i32::try_from(p).map_err(|_| format!("too many joints for `{}`", joint.name))?
-            }
-            None => -1,
-        };
-        bytes.extend(parent.to_le_bytes());
-    }
-    Ok(bytes)
+/// The joints' parents as the file holds them, −1 for a root.
+fn parents(joints: &[Joint]) -> Result<Vec<i32>, Flaw> {
+    let parent = |joint: &Joint| match joint.parent {
+        Some(p) => i32::try_from(p)
+            .map_err(|_| Flaw::content(format!("joint `{}`", joint.name), "too many joints")),
+        None => Ok(-1),
+    };
+    joints.iter().map(parent).collect()
 }
 
-fn translations<'a>(transforms: impl Iterator<Item = &'a Isometry3<f64>>) -> Vec<u8> {
-    let numbers = transforms.flat_map(|t| [t.translation.x, t.translation.y, t.translation.z]);
-    numbers.flat_map(|x| (x as f32).to_le_bytes()).collect()
+fn translations<'a>(
+    transforms: impl Iterator<Item = &'a Isometry3<f64>>,
+) -> impl Iterator<Item = f32> {
+    transforms.flat_map(|t| [t.translation.x, t.translation.y, t.translation.z].map(|x| x as f32))
 }
 
-fn rotations<'a>(transforms: impl Iterator<Item = &'a Isometry3<f64>>) -> Vec<u8> {
-    let numbers = transforms.flat_map(|t| [t.rotation.w, t.rotation.i, t.rotation.j, t.rotation.k]);
-    numbers.flat_map(|x| (x as f32).to_le_bytes()).collect()
+fn rotations<'a>(
+    transforms: impl Iterator<Item = &'a Isometry3<f64>>,
+) -> impl Iterator<Item = f32> {
+    let numbers = |t: &Isometry3<f64>| [t.rotation.w, t.rotation.i, t.rotation.j, t.rotation.k];
+    transforms.flat_map(move |t| numbers(t).map(|x| x as f32))
 }
 
-/// Elements of a tensor, after its type and shape are found to be those wanted (`None` is any length).
-fn values<const N: usize>(
-    tensors: &SafeTensors<'_>,
-    name: &str,
-    dtype: Dtype,
-    shape: &[Option<usize>],
-) -> Result<Vec<[u8; N]>, String> {
-    let tensor = tensors
-        .tensor(name)
-        .map_err(|_| format!("no tensor `{name}`"))?;
-    let found = tensor.shape();
-    let fits = found.len() == shape.len()
-        && found
-            .iter()
-            .zip(shape)
-            .all(|(have, want)| want.is_none_or(|want| *have == want));
-    if tensor.dtype() != dtype || !fits {
-        let want: Vec<String> = shape
-            .iter()
-            .map(|s| s.map_or("F".to_owned(), |s| s.to_string()))
-            .collect();
-        let want = want.join(", ");
-        return Err(format!(
-            "tensor `{name}` is {:?} {found:?} where {dtype:?} [{want}] is wanted",
-            tensor.dtype()
-        ));
-    }
-    Ok(tensor.data().as_chunks::<N>().0.to_vec())
+/// How an error names a tensor.
+fn tensor(name: &str) -> String {
+    format!("tensor `{name}`")
 }
 
-fn floats(
-    tensors: &SafeTensors<'_>,
-    name: &str,
-    shape: &[Option<usize>],
-) -> Result<Vec<f64>, String> {
-    let bytes = values::<4>(tensors, name, Dtype::F32, shape)?;
-    let numbers: Vec<f64> = bytes
-        .into_iter()
-        .map(|b| f64::from(f32::from_le_bytes(b)))
-        .collect();
+/// The numbers of a tensor, all finite.
+fn floats(reader: &Reader, name: &str, shape: &[Option<usize>]) -> Result<Vec<f64>, Flaw> {
+    let numbers = reader.tensor::<f32>(name, shape)?;
     match numbers.iter().position(|x| !x.is_finite()) {
-        Some(at) => Err(format!(
-            "tensor `{name}`: element {at} is not a finite number"
-        )),
-        None => Ok(numbers),
+        Some(at) => {
+            let cause = format!("element {at} is not a finite number");
+            Err(Flaw::content(tensor(name), cause))
+        }
+        None => Ok(numbers.into_iter().map(f64::from).collect()),
     }
 }
 
@@ -305,12 +223,12 @@ fn isometries(
     name: &str,
     translation: &[f64],
     rotation: &[f64],
-) -> Result<Vec<Isometry3<f64>>, String> {
+) -> Result<Vec<Isometry3<f64>>, Flaw> {
     let places = translation.as_chunks::<3>().0;
     let turns = rotation.as_chunks::<4>().0;
     let isometry = |(i, (t, q)): (usize, (&[f64; 3], &[f64; 4]))| {
         let q = stored_rotation(Quaternion::new(q[0], q[1], q[2], q[3]));
-        let q = q.ok_or_else(|| format!("tensor `{name}`: rotation {i} is zero"))?;
+        let q = q.ok_or_else(|| Flaw::content(tensor(name), format!("rotation {i} is zero")))?;
         Ok(Isometry3::from_parts(
             Translation3::new(t[0], t[1], t[2]),
             q,
@@ -337,24 +255,19 @@ fn rounded(at: &Isometry3<f64>) -> Isometry3<f64> {
     )
 }
 
+/// The joints of these names, which of them are which bone, and where each hangs.
 fn joints(
+    reader: &Reader,
     names: Vec<String>,
     bones: BTreeMap<String, usize>,
-    parents: &[i32],
-    rest: Vec<Isometry3<f64>>,
-) -> Result<Vec<Joint>, String> {
+) -> Result<Vec<Joint>, Flaw> {
+    let j = Some(names.len());
+    let parents = reader.tensor::<i32>("parent", &[j])?;
+    let translation = floats(reader, "rest_translation", &[j, Some(3)])?;
+    let rotation = floats(reader, "rest_rotation", &[j, Some(4)])?;
+    let rest = isometries("rest_rotation", &translation, &rotation)?;
     let joint = |(j, ((name, &parent), rest)): (usize, ((String, &i32), Isometry3<f64>))| {
-        let parent = match parent {
-            -1 => None,
-            p => match usize::try_from(p) {
-                Ok(p) if p < j => Some(p),
-                _ => {
-                    return Err(format!(
-                        "joint {j} `{name}` has parent {p}, which isn't before it"
-                    ));
-                }
-            },
-        };
+        let parent = parent_of(j, &name, parent)?;
         Ok(Joint {
             name,
             parent,
@@ -362,13 +275,28 @@ fn joints(
             bone: None,
         })
     };
-    let joints = names.into_iter().zip(parents).zip(rest).enumerate();
+    let joints = names.into_iter().zip(&parents).zip(rest).enumerate();
     let mut joints: Vec<Joint> = joints.map(joint).collect::<Result<_, _>>()?;
     for (bone, j) in bones {
-        let joint = joints.get_mut(j);
-        let joint =
-            joint.ok_or_else(|| format!("bone `{bone}` is joint {j}, which isn't there"))?;
+        let Some(joint) = joints.get_mut(j) else {
+            let cause = format!("bone `{bone}` is joint {j}, which isn't there");
+            return Err(Flaw::content("humanoid", cause));
+        };
         joint.bone = Some(bone);
     }
     Ok(joints)
+}
+
+/// The parent of joint `j` that the file gives, which has to stand before it.
+fn parent_of(j: usize, name: &str, parent: i32) -> Result<Option<usize>, Flaw> {
+    if parent == -1 {
+        return Ok(None);
+    }
+    match usize::try_from(parent) {
+        Ok(before) if before < j => Ok(Some(before)),
+        _ => {
+            let cause = format!("joint {j} `{name}` has parent {parent}, which isn't before it");
+            Err(Flaw::content(tensor("parent"), cause))
+        }
+    }
 }

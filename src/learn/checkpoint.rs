@@ -1,14 +1,25 @@
 //! The files of a run: the checkpoint, from which learning goes on, and the policy, which is all that replay needs.
 
-use super::file::{FileError, Reader, Writer, read};
-use super::{Adam, LearnerState, Normalizer, Policy, PolicySpec, RngState, ValueScale};
-use serde_json::{Value, json};
+use super::{Adam, LearnError, LearnerState, Normalizer, Policy, PolicySpec, ValueScale};
+use crate::file::{self, FileError, Flaw, Format, Reader, Writer};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const VERSION: u64 = 1;
+const CHECKPOINT: Format = Format {
+    name: "checkpoint",
+    version: 1,
+    remedy: "train into a new run",
+};
+const POLICY: Format = Format {
+    name: "policy",
+    version: 1,
+    remedy: "train it again",
+};
 
 /// All that a resumed run needs to go on with the same bits. Numbers that must be exact lie in tensors, not in JSON.
+/// Random streams aren't among it: they follow from the seed and the iteration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     pub iteration: u64,
@@ -16,12 +27,8 @@ pub struct Checkpoint {
     pub samples: u64,
     pub learner: LearnerState<f32>,
     pub normalizer: Normalizer,
-    /// Random streams by name: one for shuffling, one per environment, and so on.
-    pub rngs: BTreeMap<String, Vec<RngState>>,
-    /// The environments' own state.
+    /// Other state of the run, by name: flat vectors.
     pub tensors: BTreeMap<String, Vec<f32>>,
-    /// The environments' own settings and state, as JSON.
-    pub details: Value,
 }
 
 /// A policy that can act: parameters and observation statistics.
@@ -31,14 +38,42 @@ pub struct PolicyFile {
     /// In the order of [`Policy::tensors`].
     pub parameters: Vec<f32>,
     pub normalizer: Normalizer,
-    pub tensors: BTreeMap<String, Vec<f32>>,
     /// What the observations and actions mean, as JSON.
     pub details: Value,
 }
 
+/// The metadata of a checkpoint.
+#[derive(Serialize, Deserialize)]
+struct CheckpointHeader {
+    iteration: u64,
+    samples: u64,
+    policy: PolicySpec,
+}
+
+/// The metadata of a policy file.
+#[derive(Serialize, Deserialize)]
+struct PolicyHeader {
+    policy: PolicySpec,
+    details: Value,
+}
+
 impl Checkpoint {
     /// Replaces `path` at once: a run that dies while saving keeps its last checkpoint.
-    pub fn save(&self, path: &Path) -> Result<(), FileError> {
+    ///
+    /// # Errors
+    /// A file that can't be written, or parameters that don't fit the network.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), FileError> {
+        let path = path.as_ref();
+        let writer = self.writer().map_err(|e| misfit(e).of(path, CHECKPOINT))?;
+        let header = CheckpointHeader {
+            iteration: self.iteration,
+            samples: self.samples,
+            policy: self.learner.spec.clone(),
+        };
+        writer.save(path, CHECKPOINT, &header)
+    }
+
+    fn writer(&self) -> Result<Writer, LearnError> {
         let mut writer = Writer::default();
         let LearnerState {
             spec,
@@ -47,58 +82,53 @@ impl Checkpoint {
             learning_rate,
             value_scale,
         } = &self.learner;
-        let network = |source| FileError::Network {
-            path: path.to_owned(),
-            source,
-        };
-        let policy = Policy::new(spec.clone()).map_err(network)?;
+        let policy = Policy::new(spec.clone())?;
         for (prefix, values) in [
             ("", parameters),
             ("adam.mean.", &adam.mean),
             ("adam.square.", &adam.square),
         ] {
-            super::check_length("parameter vector", values.len(), policy.parameter_count())
-                .map_err(network)?;
-            push_parameters(&mut writer, prefix, &policy, values);
+            push_parameters(&mut writer, prefix, &policy, values)?;
         }
-        writer.push("adam.steps", &[1], &[adam.steps]);
-        writer.push("learning_rate", &[1], &[*learning_rate]);
+        writer.push("adam.steps", &[1], [adam.steps]);
+        writer.push("learning_rate", &[1], [*learning_rate]);
         let ValueScale {
             mean,
             square,
             batches,
         } = *value_scale;
-        writer.push("value_scale", &[3], &[mean, square, batches]);
+        writer.push("value_scale", &[3], [mean, square, batches]);
         push_normalizer(&mut writer, &self.normalizer);
-        for (name, states) in &self.rngs {
-            let words: Vec<u64> = states.iter().flat_map(|state| state.to_words()).collect();
-            writer.push(format!("rng.{name}"), &[states.len(), 7], &words);
+        for (name, values) in &self.tensors {
+            let name = format!("{EXTRA}{name}");
+            writer.push(name, &[values.len()], values.iter().copied());
         }
-        push_extra(&mut writer, &self.tensors);
-        writer.save(
-            path,
-            &json!({
-                "format": "checkpoint", "version": VERSION, "iteration": self.iteration, "samples": self.samples,
-                "policy": spec, "details": self.details,
-            }),
-        )
+        Ok(writer)
     }
 
-    pub fn load(path: &Path) -> Result<Self, FileError> {
-        let bytes = read(path)?;
-        let reader = Reader::open(path, &bytes, "checkpoint", VERSION)?;
-        let policy = policy(&reader)?;
-        let [mean, square, batches] = exactly(&reader, "value_scale")?;
-        let [steps] = exactly(&reader, "adam.steps")?;
-        let [learning_rate] = exactly(&reader, "learning_rate")?;
+    /// Reads the checkpoint `path`.
+    ///
+    /// # Errors
+    /// A file that can't be read, or is no whole checkpoint of this version or an older one.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, FileError> {
+        file::load(path.as_ref(), CHECKPOINT, Self::from_bytes)
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Result<Self, Flaw> {
+        let reader = Reader::open(bytes, CHECKPOINT)?;
+        let header: CheckpointHeader = reader.fields()?;
+        let policy = Policy::new(header.policy).map_err(misfit)?;
+        let [mean, square, batches] = reader.array("value_scale")?;
+        let [steps] = reader.array("adam.steps")?;
+        let [learning_rate] = reader.array("learning_rate")?;
         let adam = Adam {
             mean: parameters(&reader, "adam.mean.", &policy)?,
             square: parameters(&reader, "adam.square.", &policy)?,
             steps,
         };
         Ok(Self {
-            iteration: reader.integer("iteration")?,
-            samples: reader.integer("samples")?,
+            iteration: header.iteration,
+            samples: header.samples,
             learner: LearnerState {
                 parameters: parameters(&reader, "", &policy)?,
                 spec: policy.spec().clone(),
@@ -111,134 +141,118 @@ impl Checkpoint {
                 },
             },
             normalizer: normalizer(&reader, &policy)?,
-            rngs: rngs(&reader)?,
             tensors: extra(&reader)?,
-            details: reader.field("details")?.clone(),
         })
     }
 }
 
 impl PolicyFile {
-    pub fn save(&self, path: &Path) -> Result<(), FileError> {
-        let network = |source| FileError::Network {
-            path: path.to_owned(),
-            source,
+    /// Replaces `path` at once.
+    ///
+    /// # Errors
+    /// A file that can't be written, or parameters that don't fit the network.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), FileError> {
+        let path = path.as_ref();
+        let writer = self.writer().map_err(|e| misfit(e).of(path, POLICY))?;
+        let header = PolicyHeader {
+            policy: self.spec.clone(),
+            details: self.details.clone(),
         };
-        let policy = Policy::new(self.spec.clone()).map_err(network)?;
-        let (found, expected) = (self.parameters.len(), policy.parameter_count());
-        super::check_length("parameter vector", found, expected).map_err(network)?;
-        let mut writer = Writer::default();
-        push_parameters(&mut writer, "", &policy, &self.parameters);
-        push_normalizer(&mut writer, &self.normalizer);
-        push_extra(&mut writer, &self.tensors);
-        let metadata = json!({ "format": "policy", "version": VERSION, "policy": self.spec, "details": self.details });
-        writer.save(path, &metadata)
+        writer.save(path, POLICY, &header)
     }
 
-    pub fn load(path: &Path) -> Result<Self, FileError> {
-        let bytes = read(path)?;
-        let reader = Reader::open(path, &bytes, "policy", VERSION)?;
-        let policy = policy(&reader)?;
+    fn writer(&self) -> Result<Writer, LearnError> {
+        let policy = Policy::new(self.spec.clone())?;
+        let mut writer = Writer::default();
+        push_parameters(&mut writer, "", &policy, &self.parameters)?;
+        push_normalizer(&mut writer, &self.normalizer);
+        Ok(writer)
+    }
+
+    /// Reads the policy file `path`.
+    ///
+    /// # Errors
+    /// A file that can't be read, or is no whole policy of this version or an older one.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, FileError> {
+        file::load(path.as_ref(), POLICY, Self::from_bytes)
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Result<Self, Flaw> {
+        let reader = Reader::open(bytes, POLICY)?;
+        let header: PolicyHeader = reader.fields()?;
+        let policy = Policy::new(header.policy).map_err(misfit)?;
         Ok(Self {
             parameters: parameters(&reader, "", &policy)?,
             normalizer: normalizer(&reader, &policy)?,
-            tensors: extra(&reader)?,
-            details: reader.field("details")?.clone(),
+            details: header.details,
             spec: policy.spec().clone(),
         })
     }
 }
 
-fn push_parameters(writer: &mut Writer, prefix: &str, policy: &Policy, values: &[f32]) {
+/// What the names of a checkpoint's other tensors begin with.
+const EXTRA: &str = "extra.";
+
+/// A network that can't be, or that doesn't fit its parameters.
+fn misfit(error: LearnError) -> Flaw {
+    Flaw::content("policy", error.to_string())
+}
+
+fn push_parameters(
+    writer: &mut Writer,
+    prefix: &str,
+    policy: &Policy,
+    values: &[f32],
+) -> Result<(), LearnError> {
+    super::check_length("parameter vector", values.len(), policy.parameter_count())?;
     for tensor in policy.tensors() {
-        writer.push(
-            format!("{prefix}{}", tensor.name),
-            &tensor.shape,
-            &values[tensor.range],
-        );
+        let values = values[tensor.range].iter().copied();
+        writer.push(format!("{prefix}{}", tensor.name), &tensor.shape, values);
     }
+    Ok(())
 }
 
 fn push_normalizer(writer: &mut Writer, normalizer: &Normalizer) {
-    writer.push("normalizer.count", &[1], &[normalizer.count]);
-    writer.push(
-        "normalizer.mean",
-        &[normalizer.mean.len()],
-        &normalizer.mean,
-    );
-    writer.push(
-        "normalizer.squares",
-        &[normalizer.squares.len()],
-        &normalizer.squares,
-    );
-}
-
-fn push_extra(writer: &mut Writer, tensors: &BTreeMap<String, Vec<f32>>) {
-    for (name, values) in tensors {
-        writer.push(format!("extra.{name}"), &[values.len()], values);
+    let Normalizer {
+        count,
+        mean,
+        squares,
+    } = normalizer;
+    writer.push("normalizer.count", &[1], [*count]);
+    for (name, values) in [("normalizer.mean", mean), ("normalizer.squares", squares)] {
+        writer.push(name, &[values.len()], values.iter().copied());
     }
 }
 
-fn policy(reader: &Reader) -> Result<Policy, FileError> {
-    let spec: PolicySpec = serde_json::from_value(reader.field("policy")?.clone())
-        .map_err(|_| reader.malformed("policy"))?;
-    Policy::new(spec).map_err(|source| reader.network(source))
-}
-
-fn parameters(reader: &Reader, prefix: &str, policy: &Policy) -> Result<Vec<f32>, FileError> {
+fn parameters(reader: &Reader, prefix: &str, policy: &Policy) -> Result<Vec<f32>, Flaw> {
     let mut values = Vec::new();
     for tensor in policy.tensors() {
-        values.extend(reader.tensor::<f32>(&format!("{prefix}{}", tensor.name), &tensor.shape)?);
+        let shape: Vec<_> = tensor.shape.iter().copied().map(Some).collect();
+        values.extend(reader.tensor::<f32>(&format!("{prefix}{}", tensor.name), &shape)?);
     }
     Ok(values)
 }
 
-fn normalizer(reader: &Reader, policy: &Policy) -> Result<Normalizer, FileError> {
-    let columns = policy.spec().observation;
-    let [count] = exactly(reader, "normalizer.count")?;
-    let mean = reader.tensor("normalizer.mean", &[columns])?;
-    let squares = reader.tensor("normalizer.squares", &[columns])?;
+fn normalizer(reader: &Reader, policy: &Policy) -> Result<Normalizer, Flaw> {
+    let columns = Some(policy.spec().observation);
+    let [count] = reader.array("normalizer.count")?;
     Ok(Normalizer {
         count,
-        mean,
-        squares,
+        mean: reader.tensor("normalizer.mean", &[columns])?,
+        squares: reader.tensor("normalizer.squares", &[columns])?,
     })
 }
 
-fn rngs(reader: &Reader) -> Result<BTreeMap<String, Vec<RngState>>, FileError> {
-    let mut rngs = BTreeMap::new();
-    for (name, shape) in reader.under("rng.") {
-        let rows = shape.first().copied().unwrap_or(0);
-        let words = reader.tensor::<u64>(&format!("rng.{name}"), &[rows, 7])?;
-        let (states, _) = words.as_chunks::<7>();
-        rngs.insert(
-            name,
-            states
-                .iter()
-                .map(|&state| RngState::from_words(state))
-                .collect(),
-        );
-    }
-    Ok(rngs)
-}
-
-fn extra(reader: &Reader) -> Result<BTreeMap<String, Vec<f32>>, FileError> {
-    let mut tensors = BTreeMap::new();
-    for (name, shape) in reader.under("extra.") {
-        let length = shape.first().copied().unwrap_or(0);
-        let values = reader.tensor(&format!("extra.{name}"), &[length])?;
-        tensors.insert(name, values);
-    }
-    Ok(tensors)
-}
-
-/// A vector of `N` numbers.
-fn exactly<E: super::file::Element, const N: usize>(
-    reader: &Reader,
-    name: &str,
-) -> Result<[E; N], FileError> {
-    let values: Vec<E> = reader.tensor(name, &[N])?;
-    values.try_into().map_err(|_| reader.malformed(name))
+fn extra(reader: &Reader) -> Result<BTreeMap<String, Vec<f32>>, Flaw> {
+    let named = reader.names().filter_map(|name| {
+        let rest = name.strip_prefix(EXTRA)?;
+        Some(
+            reader
+                .tensor(name, &[None])
+                .map(|values| (rest.to_owned(), values)),
+        )
+    });
+    named.collect()
 }
 
 #[cfg(test)]
@@ -247,6 +261,7 @@ mod tests {
     use crate::learn::{Activation, Config, Learner};
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
+    use serde_json::json;
 
     fn checkpoint() -> Checkpoint {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
@@ -270,25 +285,16 @@ mod tests {
         normalizer
             .update(&[0.1, 0.2, 0.3, 0.4, 1.0, 2.0, 3.0, 4.0])
             .unwrap();
-        let mut other = rng.clone();
-        other.set_stream(77);
-        other.next_u32();
         Checkpoint {
             iteration: 12,
             samples: 1 << 40,
             learner: state,
             normalizer,
-            rngs: [
-                ("shuffle".to_owned(), vec![RngState::of(&rng)]),
-                ("environments".to_owned(), vec![RngState::of(&other); 3]),
-            ]
-            .into(),
             tensors: [
                 ("phase".to_owned(), vec![0.25, 0.5]),
                 ("empty".to_owned(), vec![]),
             ]
             .into(),
-            details: json!({ "clip": "kick" }),
         }
     }
 
@@ -326,16 +332,13 @@ mod tests {
         let Checkpoint {
             learner,
             normalizer,
-            tensors,
-            details,
             ..
         } = checkpoint();
         let policy = PolicyFile {
             spec: learner.spec,
             parameters: learner.parameters,
             normalizer,
-            tensors,
-            details,
+            details: json!({ "clip": "kick" }),
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("policy.safetensors");
@@ -343,7 +346,10 @@ mod tests {
         assert_eq!(PolicyFile::load(&path).unwrap(), policy);
         assert!(matches!(
             Checkpoint::load(&path),
-            Err(FileError::Format { .. })
+            Err(FileError {
+                flaw: Flaw::OtherFormat { .. },
+                ..
+            })
         ));
     }
 
@@ -385,7 +391,7 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         let message = Checkpoint::load(&path).unwrap_err().to_string();
         assert!(
-            message.contains("actor.0.weight is F32 [6, 4], not F32 [4, 6]"),
+            message.contains("tensor `actor.0.weight` is F32 [6, 4], not F32 [4, 6]"),
             "{message}"
         );
     }

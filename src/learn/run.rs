@@ -1,9 +1,9 @@
 //! The folder of a run: everything needed to resume, replay and reproduce it.
 
 use super::{
-    Checkpoint, FileError, LearnError, Metrics, Performer, Plan, PolicyFile, TrainError, Trainer,
-    TrainerState,
+    Checkpoint, LearnError, Metrics, Performer, Plan, PolicyFile, TrainError, Trainer, TrainerState,
 };
+use crate::file::FileError;
 use crate::motion::{Motion, MotionError};
 use crate::skeleton::{Skeleton, SkeletonError};
 use crate::task::{Reference, Setting, Stage, TaskError};
@@ -225,7 +225,6 @@ impl Run {
             spec: learner.spec.clone(),
             parameters: learner.parameters.clone(),
             normalizer: normalizer.clone(),
-            tensors: Default::default(),
             details: json!({
                 "task": self.plan.task,
                 "skeleton": self.skeleton.name,
@@ -239,9 +238,7 @@ impl Run {
             samples: trainer.samples(),
             learner,
             normalizer,
-            rngs: Default::default(),
             tensors: [(STARTS.to_owned(), starts)].into(),
-            details: Value::Null,
         };
         checkpoint.save(&self.dir.join(CHECKPOINT))?;
         Ok(policy.save(&self.dir.join(POLICY))?)

@@ -181,7 +181,7 @@ fn a_resumed_learner_goes_on_with_the_same_bits() {
     let mut resumed =
         Learner::new(Config::default(), spec(Activation::Relu), &mut other_rng).unwrap();
     resumed.restore(learner.state().clone()).unwrap();
-    let mut resumed_rng = RngState::of(&rng).restore();
+    let mut resumed_rng = rng.clone();
     learner.update(&experience.batch(), &mut rng).unwrap();
     resumed
         .update(&experience.batch(), &mut resumed_rng)

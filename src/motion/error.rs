@@ -1,25 +1,48 @@
-//! What can go wrong with motion files.
+//! What can go wrong with motions.
 
-use std::path::PathBuf;
+use crate::explain::{Explain, Explanation, Parameter, explained};
+use crate::file::FileError;
 
-/// Why a motion could not be read, written or used.
-#[derive(Debug, thiserror::Error)]
+/// Why a motion can't be read, written or used.
+#[derive(Debug)]
+#[non_exhaustive]
 pub enum MotionError {
-    #[error("cannot read `{path}`: {source}", path = path.display())]
-    Read {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    #[error("cannot write `{path}`: {message}", path = path.display())]
-    Write { path: PathBuf, message: String },
-    #[error("`{path}` is not a motion: {message}", path = path.display())]
-    Format { path: PathBuf, message: String },
-    #[error(
-        "motion `{motion}` was made for skeleton `{made_for}`, which differs from `{skeleton}`: retarget it again"
-    )]
+    /// The motion's file can't be written, read or used.
+    File(FileError),
+    /// The motion was made for another skeleton.
     OtherSkeleton {
+        /// Name of the motion.
         motion: String,
+        /// Name of the skeleton that the motion was made for.
         made_for: String,
+        /// Name of the skeleton that was to move by it.
         skeleton: String,
     },
+}
+
+impl Explain for MotionError {
+    fn explain(&self) -> Explanation {
+        match self {
+            Self::File(error) => error.explain(),
+            Self::OtherSkeleton {
+                motion,
+                made_for,
+                skeleton,
+            } => Explanation::input(format!(
+                "motion `{motion}` was made for skeleton `{made_for}`, which differs from `{skeleton}`"
+            ))
+            .remedy_by(
+                Parameter::Skeleton,
+                "use that skeleton, or retarget the clip again",
+            ),
+        }
+    }
+}
+
+explained!(MotionError);
+
+impl From<FileError> for MotionError {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
+    }
 }

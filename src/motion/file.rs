@@ -1,20 +1,28 @@
-//! `NAME.motion`: a safetensors file whose metadata key `mimic` holds a JSON header.
+//! `NAME.motion`: a safetensors file with the coordinates, body poses and tracks of a [`Motion`], and its other fields as JSON
+//! metadata.
+//!
+//! Tensors are f64, for F frames, B bodies and C contact bodies: `qpos` \[F, nq\] and `qvel` \[F, nv\] in MuJoCo's order,
+//! `body_position` \[F, B, 3\], `body_rotation` \[F, B, 4\] (w, x, y, z), `phase` \[F\], `com`, `com_velocity`,
+//! `linear_momentum` and `angular_momentum` \[F, 3\], `contact` u8 \[F, C\], `root_wrench_residual` \[F, 6\]. A file that
+//! another program wrote may have f32 in place of f64. The metadata has the fields of [`Header`].
 
 use super::{Cycle, Motion, MotionError, Tracks};
 use crate::clip::{LoopMode, MOST_FPS, stored_rotation};
+use crate::file::{self, Flaw, Format, Reader, Writer};
 use nalgebra::{Isometry3, Quaternion, Translation3, Vector3, Vector6};
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
 use std::path::Path;
 
-const FORMAT: &str = "motion";
-const VERSION: u32 = 1;
+const FORMAT: Format = Format {
+    name: "motion",
+    version: 1,
+    remedy: "retarget its clip again",
+};
 
+/// The metadata of a motion file.
 #[derive(Serialize, Deserialize)]
 struct Header {
-    format: String,
-    version: u32,
     name: String,
     fps: f64,
     #[serde(rename = "loop")]
@@ -22,6 +30,7 @@ struct Header {
     cycle: CycleHeader,
     skeleton: SkeletonHeader,
     bodies: Vec<String>,
+    /// Names of the contact bodies, in the order of the columns of `contact`.
     contact_bodies: Vec<String>,
     report: serde_json::Value,
 }
@@ -39,46 +48,25 @@ struct SkeletonHeader {
 }
 
 impl Motion {
-    /// Writes the motion; the file appears whole or not at all.
-    pub fn save(&self, path: &Path) -> Result<(), MotionError> {
-        let error = |message: String| MotionError::Write {
-            path: path.into(),
-            message,
-        };
-        let bytes = self.to_bytes().map_err(error)?;
-        crate::file::replace(path, &bytes).map_err(|e| error(e.to_string()))
+    /// Writes the motion file `path`; it appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`MotionError::File`] when the file can't be written.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), MotionError> {
+        Ok(self.writer().save(path.as_ref(), FORMAT, &self.header())?)
     }
 
-    /// Reads a motion and checks that all its parts fit together.
-    pub fn load(path: &Path) -> Result<Self, MotionError> {
-        let bytes = std::fs::read(path).map_err(|source| MotionError::Read {
-            path: path.into(),
-            source,
-        })?;
-        Self::from_bytes(&bytes).map_err(|message| MotionError::Format {
-            path: path.into(),
-            message,
-        })
-    }
-
-    fn to_bytes(&self) -> Result<Vec<u8>, String> {
-        let header = serde_json::to_string(&self.header()).map_err(|e| e.to_string())?;
-        let columns = self.columns();
-        let bytes: Vec<Vec<u8>> = columns.iter().map(Column::bytes).collect();
-        let views = columns
-            .iter()
-            .zip(&bytes)
-            .map(|(column, bytes)| Ok((column.name, column.view(bytes)?)))
-            .collect::<Result<Vec<_>, String>>()?;
-        let metadata = HashMap::from([("mimic".to_owned(), header)]);
-        safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
+    /// Reads the motion file `path` and checks that all its parts fit together.
+    ///
+    /// # Errors
+    /// [`MotionError::File`] when the file can't be read, or is no whole motion of this version or an older one.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, MotionError> {
+        Ok(file::load(path.as_ref(), FORMAT, Self::from_bytes)?)
     }
 
     fn header(&self) -> Header {
         let name = |&b: &usize| self.body_names.get(b).cloned().unwrap_or_default();
         Header {
-            format: FORMAT.into(),
-            version: VERSION,
             name: self.name.clone(),
             fps: self.fps,
             loop_mode: self.loop_mode,
@@ -96,53 +84,37 @@ impl Motion {
         }
     }
 
-    fn columns(&self) -> Vec<Column> {
-        let t = &self.tracks;
-        let vectors = |v: &[Vector3<f64>]| v.iter().map(|v| v.iter().copied().collect()).collect();
+    fn writer(&self) -> Writer {
+        let mut writer = Writer::default();
+        let frames = self.qpos.len();
+        let width = |rows: &[Vec<f64>]| rows.first().map_or(0, Vec::len);
+        for (name, rows) in [("qpos", &self.qpos), ("qvel", &self.qvel)] {
+            let values = rows.iter().flatten().copied();
+            writer.push(name, &[frames, width(rows)], values);
+        }
+        let bodies = self.bodies.first().map_or(0, Vec::len);
+        let poses = || self.bodies.iter().flatten();
         let position = |p: &Isometry3<f64>| <[f64; 3]>::from(p.translation.vector);
         let rotation = |p: &Isometry3<f64>| {
             let r = &p.rotation;
             [r.w, r.i, r.j, r.k]
         };
-        let poses = self.bodies.iter();
-        let positions = poses.clone().map(|f| f.iter().flat_map(position).collect());
-        let rotations = poses.map(|f| f.iter().flat_map(rotation).collect());
-        let contact = |row: &Vec<bool>| row.iter().map(|&c| f64::from(u8::from(c))).collect();
-        let wrench = |w: &Vector6<f64>| w.iter().copied().collect();
-        let rows = |name, rows| Column::new(name, rows);
-        vec![
-            rows("qpos", self.qpos.clone()),
-            rows("qvel", self.qvel.clone()),
-            rows("body_position", positions.collect()).split(3),
-            rows("body_rotation", rotations.collect()).split(4),
-            rows("phase", t.phase.iter().map(|&p| vec![p]).collect()).flat(),
-            rows("com", vectors(&t.com)),
-            rows("com_velocity", vectors(&t.com_velocity)),
-            rows("linear_momentum", vectors(&t.linear_momentum)),
-            rows("angular_momentum", vectors(&t.angular_momentum)),
-            rows("contact", t.contact.iter().map(contact).collect()).of_bytes(),
-            rows(
-                "root_wrench_residual",
-                t.root_wrench_residual.iter().map(wrench).collect(),
-            ),
-        ]
+        let positions = poses().flat_map(position);
+        writer.push("body_position", &[frames, bodies, 3], positions);
+        let rotations = poses().flat_map(rotation);
+        writer.push("body_rotation", &[frames, bodies, 4], rotations);
+        push_tracks(&mut writer, &self.tracks);
+        writer
     }
 
-    fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
-        let header = read_header(bytes)?;
-        let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
-        let table = Table { tensors };
+    fn from_bytes(bytes: &[u8]) -> Result<Self, Flaw> {
+        let reader = Reader::open(bytes, FORMAT)?;
+        let header = header(&reader)?;
+        let table = Table { reader };
         let qpos = table.rows("qpos", None)?;
         let frames = qpos.len();
         let bodies = header.bodies.len();
-        let contact_bodies = header
-            .contact_bodies
-            .iter()
-            .map(|name| {
-                let at = header.bodies.iter().position(|b| b == name);
-                at.ok_or_else(|| format!("contact body `{name}` is not one of its bodies"))
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        let contact_bodies = contact_bodies(&header)?;
         let rows = |name: &str, width: usize| table.rows_of(name, frames, Some(width));
         let poses = poses(
             &rows("body_position", 3 * bodies)?,
@@ -169,48 +141,56 @@ impl Motion {
     }
 }
 
-fn read_header(bytes: &[u8]) -> Result<Header, String> {
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let text = metadata.metadata().as_ref().and_then(|m| m.get("mimic"));
-    let text = text.ok_or("it has no `mimic` metadata")?;
-    let header: Header =
-        serde_json::from_str(text).map_err(|e| format!("its `mimic` metadata: {e}"))?;
-    if header.format != FORMAT {
-        return Err(format!("it holds a {}", header.format));
+fn push_tracks(writer: &mut Writer, tracks: &Tracks) {
+    let frames = tracks.phase.len();
+    writer.push("phase", &[frames], tracks.phase.iter().copied());
+    for (name, vectors) in [
+        ("com", &tracks.com),
+        ("com_velocity", &tracks.com_velocity),
+        ("linear_momentum", &tracks.linear_momentum),
+        ("angular_momentum", &tracks.angular_momentum),
+    ] {
+        let values = vectors.iter().flat_map(|v| <[f64; 3]>::from(*v));
+        writer.push(name, &[frames, 3], values);
     }
-    if header.version > VERSION {
-        return Err(format!(
-            "it has version {}, and this program reads up to {VERSION}; update it",
-            header.version
-        ));
-    }
+    let columns = tracks.contact.first().map_or(0, Vec::len);
+    let contact = tracks.contact.iter().flatten().map(|&c| u8::from(c));
+    writer.push("contact", &[frames, columns], contact);
+    let wrenches = tracks.root_wrench_residual.iter();
+    let wrenches = wrenches.flat_map(|w| <[f64; 6]>::from(*w));
+    writer.push("root_wrench_residual", &[frames, 6], wrenches);
+}
+
+/// The metadata, as far as it can be checked without the tensors.
+fn header(reader: &Reader) -> Result<Header, Flaw> {
+    let header: Header = reader.fields()?;
     if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
-        return Err(format!(
-            "its frame rate {} is no positive number up to {MOST_FPS}",
-            header.fps
-        ));
+        let cause = format!("{} is no positive rate up to {MOST_FPS} Hz", header.fps);
+        return Err(Flaw::content("fps", cause));
     }
     let cycle = &header.cycle;
-    if !cycle
-        .translation
-        .iter()
-        .chain([&cycle.heading])
-        .all(|x| x.is_finite())
-    {
-        return Err("its cycle is not finite".into());
+    if !cycle.heading.is_finite() || cycle.translation.iter().any(|x| !x.is_finite()) {
+        return Err(Flaw::content("cycle", "a number is not finite"));
     }
     Ok(header)
 }
 
-fn poses(
-    positions: &[Vec<f64>],
-    rotations: &[Vec<f64>],
-) -> Result<Vec<Vec<Isometry3<f64>>>, String> {
+fn contact_bodies(header: &Header) -> Result<Vec<usize>, Flaw> {
+    let index = |name: &String| {
+        let at = header.bodies.iter().position(|body| body == name);
+        let unknown = || format!("`{name}` is not one of the bodies");
+        at.ok_or_else(|| Flaw::content("contact_bodies", unknown()))
+    };
+    header.contact_bodies.iter().map(index).collect()
+}
+
+/// Poses of all bodies from the rows of two tensors.
+fn poses(positions: &[Vec<f64>], rotations: &[Vec<f64>]) -> Result<Vec<Vec<Isometry3<f64>>>, Flaw> {
     let pose = |(p, r): (&[f64], &[f64])| {
         let shift = Translation3::from(Vector3::from_column_slice(p));
         let turn = stored_rotation(Quaternion::new(r[0], r[1], r[2], r[3]));
-        let turn = turn.ok_or("the rotation of a body is zero: `body_rotation` is damaged")?;
-        Ok(Isometry3::from_parts(shift, turn))
+        let zero = || Flaw::content(tensor("body_rotation"), "a rotation is zero");
+        Ok(Isometry3::from_parts(shift, turn.ok_or_else(zero)?))
     };
     positions
         .iter()
@@ -219,67 +199,14 @@ fn poses(
         .collect()
 }
 
-/// One tensor to be written: a row per frame.
-struct Column {
-    name: &'static str,
-    rows: Vec<Vec<f64>>,
-    /// Size of the innermost axis, if rows have two.
-    inner: Option<usize>,
-    one_axis: bool,
-    bytes: bool,
+/// How an error names a tensor.
+fn tensor(name: &str) -> String {
+    format!("tensor `{name}`")
 }
 
-impl Column {
-    fn new(name: &'static str, rows: Vec<Vec<f64>>) -> Self {
-        Self {
-            name,
-            rows,
-            inner: None,
-            one_axis: false,
-            bytes: false,
-        }
-    }
-
-    fn split(mut self, inner: usize) -> Self {
-        self.inner = Some(inner);
-        self
-    }
-
-    fn flat(mut self) -> Self {
-        self.one_axis = true;
-        self
-    }
-
-    fn of_bytes(mut self) -> Self {
-        self.bytes = true;
-        self
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        let values = self.rows.iter().flatten();
-        if self.bytes {
-            values.map(|&x| u8::from(x != 0.0)).collect()
-        } else {
-            values.flat_map(|x| x.to_le_bytes()).collect()
-        }
-    }
-
-    fn view<'a>(&self, bytes: &'a [u8]) -> Result<TensorView<'a>, String> {
-        let width = self.rows.first().map_or(0, Vec::len);
-        let mut shape = vec![self.rows.len()];
-        match self.inner {
-            Some(inner) => shape.extend([width / inner, inner]),
-            None if !self.one_axis => shape.push(width),
-            None => {}
-        }
-        let dtype = if self.bytes { Dtype::U8 } else { Dtype::F64 };
-        TensorView::new(dtype, shape, bytes).map_err(|e| format!("{}: {e}", self.name))
-    }
-}
-
-/// Tensors of a file, read as rows of numbers.
+/// Tensors of a file, read as rows of numbers, one row per frame.
 struct Table<'a> {
-    tensors: SafeTensors<'a>,
+    reader: Reader<'a>,
 }
 
 impl Table<'_> {
@@ -289,23 +216,21 @@ impl Table<'_> {
         name: &str,
         frames: usize,
         width: Option<usize>,
-    ) -> Result<Vec<Vec<f64>>, String> {
+    ) -> Result<Vec<Vec<f64>>, Flaw> {
         if width == Some(0) {
             return Ok(vec![Vec::new(); frames]);
         }
         let rows = self.rows(name, width)?;
         if rows.len() != frames {
-            return Err(format!(
-                "tensor `{name}` has {} frames where `qpos` has {frames}",
-                rows.len()
-            ));
+            let cause = format!("{} frames where `qpos` has {frames}", rows.len());
+            return Err(Flaw::content(tensor(name), cause));
         }
         Ok(rows)
     }
 
-    fn tracks(&self, frames: usize, contact_bodies: usize) -> Result<Tracks, String> {
+    fn tracks(&self, frames: usize, contact_bodies: usize) -> Result<Tracks, Flaw> {
         let rows = |name: &str, width: usize| self.rows_of(name, frames, Some(width));
-        let vectors = |name: &str| -> Result<Vec<Vector3<f64>>, String> {
+        let vectors = |name: &str| -> Result<Vec<Vector3<f64>>, Flaw> {
             let rows = rows(name, 3)?;
             Ok(rows.iter().map(|r| Vector3::from_column_slice(r)).collect())
         };
@@ -326,27 +251,22 @@ impl Table<'_> {
         })
     }
 
-    /// `name` with all axes but the first as one, of size `width` if given.
-    fn rows(&self, name: &str, width: Option<usize>) -> Result<Vec<Vec<f64>>, String> {
-        let view = self
-            .tensors
-            .tensor(name)
-            .map_err(|_| format!("it has no tensor `{name}`"))?;
-        let values = numbers(&view).ok_or_else(|| {
-            format!("tensor `{name}` has to hold finite numbers of type F64, F32 or U8")
-        })?;
+    /// `name` with all axes but the first taken as one, of size `width` if given.
+    fn rows(&self, name: &str, width: Option<usize>) -> Result<Vec<Vec<f64>>, Flaw> {
+        let wrong = |cause: String| Err(Flaw::content(tensor(name), cause));
+        let view = self.reader.view(name)?;
+        let Some(values) = numbers(&view) else {
+            return wrong("not finite numbers of type F64, F32 or U8".to_owned());
+        };
         let frames = view.shape().first().copied().unwrap_or(0);
         let found = values.len().checked_div(frames).unwrap_or(0);
-        if width.is_some_and(|w| frames > 0 && w != found) {
-            return Err(format!(
-                "tensor `{name}` has {found} numbers per frame instead of {}",
-                width.unwrap_or(0)
-            ));
+        match width {
+            _ if found == 0 => wrong("empty".to_owned()),
+            Some(width) if width != found => {
+                wrong(format!("{found} numbers per frame instead of {width}"))
+            }
+            _ => Ok(values.chunks_exact(found).map(<[f64]>::to_vec).collect()),
         }
-        if found == 0 {
-            return Err(format!("tensor `{name}` is empty"));
-        }
-        Ok(values.chunks_exact(found).map(<[f64]>::to_vec).collect())
     }
 }
 

@@ -109,7 +109,7 @@ impl Args {
         for input in &inputs {
             make_room(&output, input, "clip")?;
         }
-        clip.save(&output).map_err(|e| Failure::write(&output, e))?;
+        clip.save(&output).map_err(|e| Failure::clip(&output, e))?;
         let report = ClipReport::new(&output, clip);
         printer.problems(report.problems());
         printer.result(&report, || report.line())
@@ -212,7 +212,7 @@ fn read(input: &Path) -> Outcome<Clip> {
         ));
     }
     if locate::has_extension(input, "clip") {
-        return Clip::load(input).map_err(|e| Failure::input(input, e));
+        return Clip::load(input).map_err(|e| Failure::clip(input, e));
     }
     import::load(input, &import::Options::default()).map_err(|e| Failure::input(input, e))
 }

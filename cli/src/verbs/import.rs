@@ -163,7 +163,7 @@ impl Args {
         };
         let clip = import::load(input, &options).map_err(|e| Failure::input(input, e))?;
         make_room(output, input, "clip")?;
-        clip.save(output).map_err(|e| Failure::write(output, e))?;
+        clip.save(output).map_err(|e| Failure::clip(output, e))?;
         Ok(ClipReport::new(output, clip))
     }
 }

@@ -112,7 +112,7 @@ fn tell(path: &Path, map: &HumanoidMap, printer: &Printer) {
 
 fn look(file: &Path) -> Outcome<(Report, Vec<Joint>)> {
     if locate::has_extension(file, "clip") {
-        let clip = Clip::load(file).map_err(|e| Failure::input(file, e))?;
+        let clip = Clip::load(file).map_err(|e| Failure::clip(file, e))?;
         return Ok(of_clip(file, clip));
     }
     let found = import::inspect(file).map_err(|e| Failure::input(file, e))?;

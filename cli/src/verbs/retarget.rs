@@ -58,9 +58,7 @@ impl Args {
         let quality = motion.quality(&skeleton);
         make_room(&output, &file, "motion")?;
         let seconds = seconds.unwrap_or_default();
-        motion
-            .save(&output)
-            .map_err(|e| Failure::write(&output, e))?;
+        motion.save(&output).map_err(|e| Failure::explained(&e))?;
         let frames = motion.qpos.len();
         let mut report = json!({
             "motion": output,

@@ -1,19 +1,31 @@
-//! Writing files so that nobody ever finds half of one.
+//! Files: written so that nobody ever finds half of one, and one envelope for all that hold tensors.
+//!
+//! Clips, motions, checkpoints and policies are safetensors files whose metadata has one key, `mimic`, with a JSON object
+//! that says `format` and `version`. Older versions stay readable. A newer one is refused before anything else in the file
+//! is looked at.
+
+mod error;
+mod format;
+mod tensors;
+
+pub use error::{FileError, Flaw};
+pub use format::Format;
+pub(crate) use tensors::{Reader, Writer, load};
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Puts `bytes` into `path` at once: they are written to a temporary file beside it, taken to the disk, and renamed.
-/// Whoever is killed in between leaves the old file, or none.
+/// Replaces the content of the file `path` by `bytes`, at once: they are written to a temporary file beside it, flushed to
+/// the disk, and renamed. A process that is killed in between leaves the old file, or none.
 ///
 /// # Errors
-/// A folder that isn't there or can't be written, or a full disk.
-pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    replace_by(path, |file| file.write_all(bytes))
+/// A folder that doesn't exist or can't be written, or a full disk.
+pub fn replace(path: impl AsRef<Path>, bytes: &[u8]) -> io::Result<()> {
+    replace_by(path.as_ref(), |file| file.write_all(bytes))
 }
 
-/// The same with what `write` writes.
+/// Replaces the content of the file `path` by what `write` writes.
 fn replace_by(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let folder = path
         .parent()
@@ -24,11 +36,20 @@ fn replace_by(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> i
     // Temporary files are private by default; this one becomes a file like any other.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
+    let mut file = builder.tempfile_in(folder).map_err(unnamed)?;
     write(file.as_file_mut())?;
     file.as_file().sync_all()?;
     file.persist(path)?;
     Ok(())
+}
+
+/// The error without the name of the temporary file, which the caller never chose. `tempfile` wraps the system's error in
+/// one of its own to add the name, and keeps its kind.
+fn unnamed(error: io::Error) -> io::Error {
+    match error.get_ref() {
+        Some(_) => error.kind().into(),
+        None => error,
+    }
 }
 
 #[cfg(test)]
