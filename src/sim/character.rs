@@ -1,4 +1,4 @@
-//! A skeleton as the simulation sees it: welded bodies are one link, and a link has one joint.
+//! A skeleton as the simulation sees it: bodies that are welded together are one link, and each link has one joint.
 
 use super::error::SimError;
 use super::state::LinkState;
@@ -6,45 +6,54 @@ use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton, point_inertia};
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
-/// How a link turns in its parent.
+/// How a link moves in its parent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkJoint {
-    /// The root: moves freely.
+    /// Moves and turns freely: the root.
     Free,
-    /// Turns any way about the anchor; drives and limits are those of its exponential map along x, y, z.
+    /// Turns any way about the anchor.
     Ball {
+        /// Drives of the exponential-map coordinates along the link's x, y, z.
         drives: [Drive; 3],
+        /// Ranges of the same coordinates, radians. Targets keep to them; the simulation doesn't enforce them.
         limits: [[f64; 2]; 3],
     },
-    /// Two or three hinges of one body, turning it one after the other. The simulation joins it as a ball, aimed at
-    /// what the hinges can reach: a direction that none of two hinges has is held by a drive as stiff as theirs.
+    /// Two or three hinges of one body, which turn it one after the other. The simulation treats them as a ball whose targets
+    /// are rotations that the hinges can reach. An axis that none of two hinges has is held by a drive as stiff as theirs.
     Hinges {
+        /// The hinges in the order in which they act.
         hinges: Vec<HingeAxis>,
-        /// Along the link's x, y, z.
+        /// Drives of the exponential-map coordinates along the link's x, y, z.
         drives: [Drive; 3],
     },
-    /// Turns about a unit axis in the link's frame.
-    Hinge { axis: HingeAxis, drive: Drive },
+    /// Turns about one axis.
+    Hinge {
+        /// The axis and the range about it.
+        axis: HingeAxis,
+        /// The drive of the angle.
+        drive: Drive,
+    },
 }
 
-/// What a hinge turns about, and how far.
+/// The axis about which a hinge turns, and its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HingeAxis {
     /// Unit vector in the link's frame.
     pub direction: Vector3<f64>,
-    /// Radians.
+    /// Lowest and highest angle, radians.
     pub limit: [f64; 2],
 }
 
 impl HingeAxis {
-    /// A range of a full turn stops nothing.
+    /// Whether the range limits anything. A full turn doesn't: MJCF without a range loads as −π to π. The tolerance is for
+    /// ranges that are written in degrees or with few digits.
     pub(super) fn is_limited(&self) -> bool {
         self.limit[1] - self.limit[0] < TAU - 1e-6
     }
 }
 
 impl LinkJoint {
-    /// Number of drive coordinates: 3 for a ball, 1 for each hinge.
+    /// Number of drive coordinates: 3 for a ball, 1 for each hinge, none for the root.
     pub fn dof(&self) -> usize {
         match self {
             LinkJoint::Free => 0,
@@ -55,28 +64,32 @@ impl LinkJoint {
     }
 }
 
-/// A rigid piece of the character: a body and what is welded to it.
+/// A rigid part of the character: a body of the skeleton and the bodies that are welded to it.
 #[derive(Clone, Debug)]
 pub struct Link {
+    /// Name of the body whose frame is this link's frame.
     pub name: String,
-    /// The skeleton's body whose frame is this link's frame.
+    /// Index of that body in the skeleton.
     pub body: usize,
-    /// Index of the parent link.
+    /// Index of the parent link; `None` for the root.
     pub parent: Option<usize>,
-    /// Parent link from this link at zero joint coordinates.
+    /// Parent link from this link, at zero joint coordinates.
     pub rest: Isometry3<f64>,
+    /// The joint between parent and link.
     pub joint: LinkJoint,
-    /// Where the link's joint turns, in its own frame, metres.
+    /// Centre of the joint in the link's frame, metres.
     pub anchor: Vector3<f64>,
-    /// First drive coordinate of this link.
+    /// Index of its first drive coordinate.
     pub dof: usize,
-    /// kg.
+    /// Mass, kg.
     pub mass: f64,
-    /// In the link's frame, metres.
+    /// Centre of mass in the link's frame, metres.
     pub com: Vector3<f64>,
-    /// About the centre of mass, along the link's axes, kg·m².
+    /// Moment of inertia about the centre of mass, along the link's axes, kg·m².
     pub inertia: Matrix3<f64>,
+    /// The shapes that can touch the ground, in the link's frame.
     pub shapes: Vec<Shape>,
+    /// Coulomb friction coefficient of the link's own body. It counts for all shapes.
     pub friction: f64,
 }
 
@@ -101,10 +114,11 @@ pub struct Character {
 }
 
 impl Character {
-    /// Merges welded bodies into links.
+    /// Makes the character of a skeleton: merges bodies that are welded together into links.
     ///
     /// # Errors
-    /// A skeleton whose joints impulse joints cannot express.
+    /// [`SimError`] for a skeleton that can't be simulated: one with slide joints, more joints on a body than a ball or three
+    /// hinges, a root that isn't free, a second root, or a link without mass.
     pub fn new(skeleton: &Skeleton) -> Result<Self, SimError> {
         let mut character = Character {
             links: Vec::new(),
@@ -126,6 +140,7 @@ impl Character {
         }
     }
 
+    /// Adds a link for a body that has joints.
     fn add(&mut self, index: usize, body: &Body, parent: Option<usize>) -> Result<(), SimError> {
         let joint = link_joint(body, parent.is_none())?;
         if parent.is_none() && !self.links.is_empty() {
@@ -160,6 +175,7 @@ impl Character {
         Ok(())
     }
 
+    /// Merges a body without joints into its parent's link.
     fn weld(&mut self, body: &Body, parent: usize) {
         let Attachment {
             link,
@@ -176,6 +192,7 @@ impl Character {
         let com = (at * nalgebra::Point3::from(body.com)).coords;
         let turn = at.rotation.to_rotation_matrix();
         let inertia = turn * body.inertia * turn.inverse();
+        // Both inertias move to the common centre of mass by the parallel axis theorem.
         let mass = link.mass + body.mass;
         if mass > 0.0 {
             let center = (link.com * link.mass + com * body.mass) / mass;
@@ -187,7 +204,11 @@ impl Character {
         }
     }
 
-    /// States of the links of `skeleton`, which this character was made of, at its coordinates and their velocities.
+    /// States of all links, `[links]`, at coordinates `qpos` and velocities `qvel` of the skeleton that this character was made
+    /// of.
+    ///
+    /// # Panics
+    /// If `qpos` is shorter than [`Skeleton::nq`] or `qvel` than [`Skeleton::nv`].
     pub fn states(&self, skeleton: &Skeleton, qpos: &[f64], qvel: &[f64]) -> Vec<LinkState> {
         let (poses, twists) = (skeleton.forward(qpos), skeleton.twists(qpos, qvel));
         let state = |link: &Link| LinkState {
@@ -236,7 +257,7 @@ impl Character {
         }
     }
 
-    /// Joint rotation of link `link` from the rotations of all links: identity at rest.
+    /// Joint rotation of link `link`, the identity at rest, given the orientations of its parent and of itself in the world.
     pub fn joint_rotation(
         &self,
         link: usize,
@@ -247,6 +268,7 @@ impl Character {
     }
 }
 
+/// A shape in the frame that `by` leads to.
 fn moved(shape: &Shape, by: &Isometry3<f64>) -> Shape {
     let point = |p: &Vector3<f64>| (by * nalgebra::Point3::from(*p)).coords;
     match shape {
@@ -266,6 +288,7 @@ fn moved(shape: &Shape, by: &Isometry3<f64>) -> Shape {
     }
 }
 
+/// The one joint that stands for all joints of a body.
 fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
     let name = || body.name.clone();
     if is_root {
@@ -312,9 +335,10 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
     }
 }
 
-/// Hinges that meet in one body; `None` where neighbours turn about the same axis.
+/// Several hinges of one body as one joint; `None` if neighbours turn about the same axis.
 fn hinges_of_one(hinges: &[(HingeAxis, Drive)]) -> Option<LinkJoint> {
     for pair in hinges.windows(2) {
+        // Sine of the angle between the axes; chosen: below a millionth they are the same.
         let across = pair[0].0.direction.cross(&pair[1].0.direction);
         across.try_normalize(1e-6)?;
     }
@@ -324,7 +348,7 @@ fn hinges_of_one(hinges: &[(HingeAxis, Drive)]) -> Option<LinkJoint> {
     })
 }
 
-/// The drive of the hinge nearest to a direction, or the stiffest where none is near.
+/// The drive of the hinge whose axis is nearest to a direction, or the stiffest drive if no axis is near.
 fn gains(hinges: &[(HingeAxis, Drive)], along: &Vector3<f64>) -> Drive {
     let share = |hinge: &(HingeAxis, Drive)| hinge.0.direction.dot(along).abs();
     let mut best = hinges[0];
@@ -333,6 +357,7 @@ fn gains(hinges: &[(HingeAxis, Drive)], along: &Vector3<f64>) -> Drive {
             best = *hinge;
         }
     }
+    // Chosen: an axis more than 60° away says nothing about this direction.
     if share(&best) < 0.5 {
         for hinge in hinges {
             if hinge.1.kp > best.1.kp {
@@ -343,7 +368,7 @@ fn gains(hinges: &[(HingeAxis, Drive)], along: &Vector3<f64>) -> Drive {
     best.1
 }
 
-/// A rotation whose X axis is `axis`.
+/// A rotation that turns X to the unit vector `axis`.
 pub(super) fn x_along(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
     let turn = Rotation3::rotation_between(&Vector3::x(), axis)
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI));

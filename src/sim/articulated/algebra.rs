@@ -1,10 +1,14 @@
 //! Vectors, matrices and rotations of eight characters.
+//!
+//! Sines, cosines and arc tangents are polynomials in the basic operations, because the functions of the C library work on
+//! one number at a time and differ between systems in the last bit.
 
 use super::lanes::Lanes;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
+/// A vector of three components.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vec3<L> {
     pub x: L,
@@ -31,8 +35,8 @@ impl<L: Lanes> Vec3<L> {
     }
 
     #[inline(always)]
-    pub fn of(&self, lane: usize) -> Vector3<f32> {
-        Vector3::new(self.x.of(lane), self.y.of(lane), self.z.of(lane))
+    pub fn get(&self, lane: usize) -> Vector3<f32> {
+        Vector3::new(self.x.get(lane), self.y.get(lane), self.z.get(lane))
     }
 
     #[inline(always)]
@@ -101,7 +105,7 @@ impl<L: Lanes> Mul<L> for Vec3<L> {
     }
 }
 
-/// A rotation matrix, by columns.
+/// A rotation matrix by columns: the axes of the rotated frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rotation<L>(pub [Vec3<L>; 3]);
 
@@ -113,7 +117,7 @@ impl<L: Lanes> Rotation<L> {
     }
 }
 
-/// A symmetric matrix.
+/// A symmetric 3×3 matrix.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Symmetric<L> {
     pub xx: L,
@@ -134,7 +138,7 @@ impl<L: Lanes> Symmetric<L> {
         yz: L::ZERO,
     };
 
-    /// The same matrix in every lane; its upper triangle is read.
+    /// The same matrix in every lane. Only its upper triangle is read.
     #[inline(always)]
     pub fn splat(m: &Matrix3<f32>) -> Self {
         Symmetric {
@@ -156,9 +160,9 @@ impl<L: Lanes> Symmetric<L> {
         }
     }
 
-    /// R S Rᵀ.
+    /// R S Rᵀ: the matrix of a quantity such as an inertia in the axes that R turns to.
     #[inline(always)]
-    pub fn turned(&self, rotation: &Rotation<L>) -> Self {
+    pub fn rotated(&self, rotation: &Rotation<L>) -> Self {
         let [a, b, c] = rotation.0;
         // Columns of R S.
         let x = a * self.xx + b * self.xy + c * self.xz;
@@ -174,9 +178,9 @@ impl<L: Lanes> Symmetric<L> {
         }
     }
 
-    /// Second moment of `mass` at `at`: mass (|at|² 1 − at atᵀ).
+    /// Inertia about the origin of a point mass at `at`, m (|r|² 1 − r rᵀ): the parallel axis theorem's term.
     #[inline(always)]
-    pub fn parallel(mass: L, at: &Vec3<L>) -> Self {
+    pub fn point_inertia(mass: L, at: &Vec3<L>) -> Self {
         let m = *at * mass;
         let [xx, yy, zz] = [m.x * at.x, m.y * at.y, m.z * at.z];
         Symmetric {
@@ -201,7 +205,7 @@ impl<L: Lanes> Symmetric<L> {
         }
     }
 
-    /// S⁻¹ v by cofactors; zero where S has no inverse.
+    /// S⁻¹ v by Cramer's rule; zero where S is singular.
     #[inline(always)]
     pub fn solve(&self, v: &Vec3<L>) -> Vec3<L> {
         let cofactors = Symmetric {
@@ -213,9 +217,10 @@ impl<L: Lanes> Symmetric<L> {
             yz: self.xy * self.xz - self.xx * self.yz,
         };
         let determinant = self.xx * cofactors.xx + self.xy * cofactors.xy + self.xz * cofactors.xz;
+        // One over a smaller determinant would be infinite. Such a lane gets zero instead, without a branch.
         let inverse = L::splat(f32::MIN_POSITIVE)
             .below(determinant.abs())
-            .choose(L::splat(1.0) / determinant, L::ZERO);
+            .select(L::splat(1.0) / determinant, L::ZERO);
         cofactors.times(v) * inverse
     }
 }
@@ -235,17 +240,17 @@ impl<L: Lanes> Add for Symmetric<L> {
     }
 }
 
-/// A unit quaternion.
+/// A unit quaternion: w = cos(angle / 2), v = axis · sin(angle / 2).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Turn<L> {
+pub(super) struct Quat<L> {
     pub w: L,
     pub v: Vec3<L>,
 }
 
-impl<L: Lanes> Turn<L> {
+impl<L: Lanes> Quat<L> {
     #[inline(always)]
     pub fn identity() -> Self {
-        Turn {
+        Quat {
             w: L::splat(1.0),
             v: Vec3::ZERO,
         }
@@ -253,15 +258,15 @@ impl<L: Lanes> Turn<L> {
 
     #[inline(always)]
     pub fn splat(turn: &UnitQuaternion<f32>) -> Self {
-        Turn {
+        Quat {
             w: L::splat(turn.w),
             v: Vec3::splat(&turn.imag()),
         }
     }
 
     #[inline(always)]
-    pub fn of(&self, lane: usize) -> UnitQuaternion<f32> {
-        UnitQuaternion::new_unchecked(Quaternion::from_parts(self.w.of(lane), self.v.of(lane)))
+    pub fn get(&self, lane: usize) -> UnitQuaternion<f32> {
+        UnitQuaternion::new_unchecked(Quaternion::from_parts(self.w.get(lane), self.v.get(lane)))
     }
 
     #[inline(always)]
@@ -272,7 +277,7 @@ impl<L: Lanes> Turn<L> {
 
     #[inline(always)]
     pub fn times(&self, other: &Self) -> Self {
-        Turn {
+        Quat {
             w: self.w * other.w - self.v.dot(&other.v),
             v: other.v * self.w + self.v * other.w + self.v.cross(&other.v),
         }
@@ -280,7 +285,7 @@ impl<L: Lanes> Turn<L> {
 
     #[inline(always)]
     pub fn inverse(&self) -> Self {
-        Turn {
+        Quat {
             w: self.w,
             v: -self.v,
         }
@@ -289,15 +294,15 @@ impl<L: Lanes> Turn<L> {
     #[inline(always)]
     pub fn normalized(&self) -> Self {
         let share = L::splat(1.0) / (self.w * self.w + self.v.dot(&self.v)).sqrt();
-        Turn {
+        Quat {
             w: self.w * share,
             v: self.v * share,
         }
     }
 
     #[inline(always)]
-    pub fn matrix(&self) -> Rotation<L> {
-        let Turn { w, v } = *self;
+    pub fn to_matrix(&self) -> Rotation<L> {
+        let Quat { w, v } = *self;
         let (double, one) = (v + v, L::splat(1.0));
         let [xx, yy, zz] = [double.x * v.x, double.y * v.y, double.z * v.z];
         let [xy, xz, yz] = [double.x * v.y, double.x * v.z, double.y * v.z];
@@ -309,10 +314,12 @@ impl<L: Lanes> Turn<L> {
         ])
     }
 
-    /// Turn by the rotation vector `v`, not farther than a full one.
+    /// The rotation by the rotation vector `v`; the identity if `v` is longer than 2π.
     #[inline(always)]
-    pub fn by(v: &Vec3<L>) -> Self {
-        // Of a quarter of the angle, which doubling it twice makes the half angle of a quaternion and then the angle.
+    pub fn from_rotation_vector(v: &Vec3<L>) -> Self {
+        // The series are taken at a quarter of the angle, where they converge fast: up to a full turn it is at most π/2.
+        // With s and c the sine and cosine of the quarter, the half angle of the quaternion has sin = 2 s c and
+        // cos = 1 − 2 s². Everything is a function of the squared angle, so a zero vector needs no special case.
         let (square, full) = (
             v.dot(v) * L::splat(1.0 / 16.0),
             L::splat(FRAC_PI_2 * FRAC_PI_2),
@@ -320,58 +327,64 @@ impl<L: Lanes> Turn<L> {
         let (within, square) = (square.below(full), square.min(full));
         let (cos, ratio) = cos_sin(square);
         let share = ratio * cos * L::splat(0.5);
-        Turn {
+        Quat {
             w: L::splat(1.0) - L::splat(2.0) * ratio * ratio * square,
-            v: *v * within.choose(share, L::ZERO),
+            v: *v * within.select(share, L::ZERO),
         }
     }
 
-    /// Turn by `angle` about a unit axis.
+    /// The rotation by `angle`, of any size, about a unit axis.
     #[inline(always)]
-    pub fn about(axis: &Vec3<L>, angle: L) -> Self {
-        // A quarter of the angle, less whole half turns of it.
+    pub fn from_axis_angle(axis: &Vec3<L>, angle: L) -> Self {
+        // Half turns of a quarter of the angle are whole turns of the half angle and change nothing. Taking the nearest whole
+        // number of them away leaves at most π/2, up to rounding, which the clamp removes.
         let quarter = angle * L::splat(0.25);
-        let turns = (quarter * L::splat(FRAC_1_PI) + L::splat(ROUND)) - L::splat(ROUND);
-        let rest = quarter - turns * L::splat(PI);
+        let rotations = (quarter * L::splat(FRAC_1_PI) + L::splat(ROUND)) - L::splat(ROUND);
+        let rest = quarter - rotations * L::splat(PI);
         let rest = rest.min(L::splat(FRAC_PI_2)).max(L::splat(-FRAC_PI_2));
         let (cos, ratio) = cos_sin(rest * rest);
         let sin = ratio * rest;
         let double = sin + sin;
-        Turn {
+        Quat {
             w: L::splat(1.0) - double * sin,
             v: *axis * (double * cos),
         }
     }
 
-    /// The rotation vector, not longer than π.
+    /// The rotation vector, no longer than π: the logarithm of the rotation.
     #[inline(always)]
-    pub fn vector(&self) -> Vec3<L> {
-        // tan(angle/4) = |v| / (1 + |w|): at most 1, and at most tan(π/8) after one more reduction.
+    pub fn rotation_vector(&self) -> Vec3<L> {
+        // tan(angle/4) = |v| / (1 + |w|), half-angle formula, which lies in 0..1. Where it exceeds tan(π/8), the tangent of
+        // angle/4 − π/4 is taken instead, (t − 1) / (t + 1), so that the series never sees more than tan(π/8).
         let (one, length) = (L::splat(1.0), self.v.norm());
         let base = one + self.w.abs();
         let tangent = length / base;
         let large = L::splat(TAN_PI_8).below(tangent);
-        let reduced = large.choose((tangent - one) / (tangent + one), tangent);
+        let reduced = large.select((tangent - one) / (tangent + one), tangent);
         let ratio = arctangent_ratio(reduced * reduced);
         let angle = ratio * reduced + L::splat(FRAC_PI_4);
-        // Of a small one |v| isn't divided by.
-        let share = large.choose(angle / length, ratio / base) * L::splat(4.0);
-        let sign = self.w.below(L::ZERO).choose(-one, one);
+        // angle/4 = |v| · ratio / (1 + |w|) for small angles: no division by |v|, which may be 0.
+        let share = large.select(angle / length, ratio / base) * L::splat(4.0);
+        // q and −q are the same rotation; with w < 0 the short way goes along −v.
+        let sign = self.w.below(L::ZERO).select(-one, one);
         self.v * (share * sign)
     }
 }
 
-/// Added and taken away again it leaves the nearest whole number of less than 2²².
+/// 1.5 · 2²³: an f32 of this size has no fraction bits, so adding it and subtracting it again rounds a number below 2²² to the
+/// nearest whole number.
 const ROUND: f32 = 12_582_912.0;
+/// tan(π/8) = √2 − 1.
 const TAN_PI_8: f32 = 0.414_213_57;
 
-/// cos x and sin x / x of x² up to (π/2)², by their Taylor series.
+/// cos x and sin x / x from x² ≤ (π/2)², by their Taylor series up to x¹² (the first term left out is below 7e-9).
 #[inline(always)]
 fn cos_sin<L: Lanes>(square: L) -> (L, L) {
     (alternating(square, 12.0), alternating(square, 13.0))
 }
 
-/// 1 − x/(m (m − 1)) + … with m the smallest of n, n − 2, … above 1, up to the term that n ends.
+/// The Taylor series 1 − x/(m (m−1)) (1 − x/((m+2) (m+1)) (1 − …)) up to the factor with `n`, by Horner's scheme. With x² for
+/// `x` it is cos x for n = 12 and sin x / x for n = 13.
 #[inline(always)]
 fn alternating<L: Lanes>(x: L, mut n: f32) -> L {
     let mut sum = L::splat(1.0);
@@ -382,7 +395,7 @@ fn alternating<L: Lanes>(x: L, mut n: f32) -> L {
     sum
 }
 
-/// arctan(x) / x of x² up to tan²(π/8): the first ten terms of its series, which leave 3e-9.
+/// arctan(x) / x from x² ≤ tan²(π/8): the first ten terms 1 − x²/3 + x⁴/5 − … (the first term left out is below 2e-9).
 #[inline(always)]
 fn arctangent_ratio<L: Lanes>(square: L) -> L {
     let mut sum = L::ZERO;

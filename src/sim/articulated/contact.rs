@@ -1,41 +1,48 @@
-//! Where the ground pushes on eight characters, and what that does to them.
+//! Contacts of eight characters with the ground.
 //!
-//! What an impulse on one body does to the twist of another, J M⁻¹ J'ᵀ (the Delassus operator), is computed for whole
-//! bodies, six by six: points of a body share it. The drives are in it too, as they are in M. Every body that any of the
-//! eight has near the ground is computed for all of them; the points then are each character's own.
+//! What an impulse on one body does to the twist of another is the Delassus matrix J M⁻¹ Jᵀ. It is computed in 6×6 blocks for
+//! whole bodies, because points of one body share them, and from half-solved Jacobians: with M = Lᵀ L and X = L⁻ᵀ Jᵀ it is
+//! Xᵀ X. M holds the implicit terms of drives and joint limits, so contacts feel how stiff the character is.
+//!
+//! A body that any of the eight characters has near the ground is prepared for all eight. Its points, and the sweeps over
+//! them, are each character's own ([`super::solve`]).
 
 use super::algebra::Vec3;
 use super::dynamics::Dynamics;
-use super::ground::{Ground, NEAR};
+use super::ground::{Ground, MARGIN};
 use super::lanes::{LANES, Lanes};
 use super::pose::Pose;
-use super::solve::{Point, Solver, Twist};
-use super::spatial::{Force, Motion};
+use super::solve::{ContactPoint, Solver, Twist};
+use super::spatial::{ForceVector, MotionVector};
 use super::state::State;
 use super::tree::{Node, Tree};
 use nalgebra::Vector3;
 use wide::f32x4;
 
-/// Contacts of one step.
+/// Contacts of one step of eight characters.
 #[derive(Clone, Debug)]
 pub(super) struct Contacts<L> {
-    /// By lane.
+    /// `[LANES]`.
     solvers: Vec<Solver>,
+    /// Factor of each character's friction coefficients.
     friction: [f32; LANES],
-    near: Vec<Near>,
-    /// `[near, width]`: halved Jacobians of their twists, along their paths.
-    halves: Vec<[L; 6]>,
+    /// Bodies that any of the characters has near the ground.
+    near: Vec<NearBody>,
+    /// `[near, width]`: columns of L⁻ᵀ Jᵀ along each body's path, J being the Jacobian of its twist.
+    half_jacobians: Vec<[L; 6]>,
+    /// Length of the longest path.
     width: usize,
-    /// `[near]`: twists without contacts, then the ground's wrenches.
+    /// `[near]`: twists at the end of the step without contacts.
     twists: Vec<[L; 6]>,
+    /// `[near]`: the ground's wrenches, moment about the body's origin, then impulse.
     wrenches: Vec<[L; 6]>,
-    /// Of every pair, the second no later than the first: twist of the first for each part of the wrench on the second.
-    coupling: Vec<[[L; 6]; 6]>,
+    /// Blocks J_a M⁻¹ J_bᵀ of all pairs b ≤ a: change of the first body's twist for each component of a wrench on the second.
+    delassus: Vec<[[L; 6]; 6]>,
 }
 
-/// A node near the ground, and the lanes in which it is.
+/// A node near the ground, and the lanes in which it is, as bits.
 #[derive(Clone, Copy, Debug)]
-struct Near {
+struct NearBody {
     node: usize,
     lanes: u32,
 }
@@ -46,42 +53,44 @@ impl<L: Lanes> Contacts<L> {
             solvers: vec![Solver::default(); LANES],
             friction: [1.0; LANES],
             near: Vec::new(),
-            halves: Vec::new(),
+            half_jacobians: Vec::new(),
             width: tree.nodes.iter().map(|n| n.path.len()).max().unwrap_or(0),
             twists: Vec::new(),
             wrenches: Vec::new(),
-            coupling: Vec::new(),
+            delassus: Vec::new(),
         }
     }
 
-    /// Takes a character's impulses, which [`Contacts::give`] gives back.
-    pub fn take(&mut self, lane: usize, state: &mut State) {
+    /// Moves a character's impulses of the last step into a lane; [`Contacts::scatter`] moves them back.
+    pub fn gather(&mut self, lane: usize, state: &mut State) {
         std::mem::swap(&mut self.solvers[lane].last, &mut state.impulses);
         self.friction[lane] = state.friction;
     }
 
-    pub fn give(&mut self, lane: usize, state: &mut State) {
+    /// Moves a lane's impulses back to its character.
+    pub fn scatter(&mut self, lane: usize, state: &mut State) {
         std::mem::swap(&mut self.solvers[lane].last, &mut state.impulses);
     }
 
-    /// Which points of the first `lanes` characters are near the ground.
+    /// Finds the points of the first `lanes` characters that are near the ground, or will be at the end of the step.
     #[inline(always)]
-    pub fn find(
+    pub fn detect(
         &mut self,
         tree: &Tree,
         pose: &Pose<L>,
-        motions: &[Motion<L>],
+        velocities: &[MotionVector<L>],
         (ground, lanes): (&Ground, usize),
     ) {
         self.near.clear();
         self.solvers.iter_mut().for_each(Solver::clear);
         let (mut id, used) = (0, (1 << lanes) - 1);
         for (i, node) in tree.nodes.iter().enumerate() {
-            if reaches_ground(node, pose, &motions[i], (i, ground.dt)) & used != 0 {
-                self.find_points(tree, pose, &motions[i], (ground, used), (i, id));
+            if reaches_ground(node, pose, &velocities[i], (i, ground.dt)) & used != 0 {
+                self.detect_points(tree, pose, &velocities[i], (ground, used), (i, id));
             }
             id += node.points.len();
         }
+        // A character in the air has nothing to start the next contact from.
         for solver in &mut self.solvers[..lanes] {
             if solver.points.is_empty() {
                 solver.last.fill(Vector3::zeros());
@@ -90,74 +99,82 @@ impl<L: Lanes> Contacts<L> {
     }
 
     #[inline(always)]
-    fn find_points(
+    fn detect_points(
         &mut self,
         tree: &Tree,
         pose: &Pose<L>,
-        motion: &Motion<L>,
+        velocity: &MotionVector<L>,
         (ground, used): (&Ground, u32),
         (i, first): (usize, usize),
     ) {
-        let (node, place) = (&tree.nodes[i], &pose.places[i]);
-        let (dt, near) = (L::splat(ground.dt), L::splat(NEAR));
+        let (node, frame) = (&tree.nodes[i], &pose.frames[i]);
+        let (dt, near) = (L::splat(ground.dt), L::splat(MARGIN));
+        // The lowest point of each ball, in all lanes at once; then one by one those that are near the ground.
         let (mut lanes, next) = (0, self.near.len());
         for (n, (point, radius)) in node.points.iter().enumerate() {
-            let mut arm = place.matrix.times(&Vec3::splat(point));
+            let mut arm = frame.matrix.times(&Vec3::splat(point));
             arm.z -= L::splat(*radius);
-            let gap = arm.z + place.origin.z + pose.origin.z;
-            let velocity = motion.at(&(place.origin + arm));
-            let mut close = gap.min(gap + dt * velocity.z).below(near).bits() & used;
+            let gap = arm.z + frame.origin.z + pose.origin.z;
+            let moving = velocity.velocity_at(&(frame.origin + arm));
+            let mut close = gap.min(gap + dt * moving.z).below(near).bits() & used;
             lanes |= close;
             while close != 0 {
                 let lane = close.trailing_zeros() as usize;
                 close &= close - 1;
-                let wants = ground.wants(gap.of(lane), velocity.of(lane));
+                let target = ground.target(gap.get(lane), moving.get(lane));
                 let friction = self.friction[lane] * node.friction;
-                let point = Point::new(first + n, arm.of(lane), wants, friction);
+                let point = ContactPoint::new(first + n, arm.get(lane), target, friction);
                 self.solvers[lane].add((i, next), point);
             }
         }
         if lanes != 0 {
-            self.near.push(Near { node: i, lanes });
+            self.near.push(NearBody { node: i, lanes });
         }
     }
 
-    /// Adds to the half solution what keeps the characters in `open` out of the ground.
+    /// Adds the contact impulses of the characters in `open` to the half solution: `delta` becomes L⁻ᵀ (… + Jᵀ λ).
     #[inline(always)]
-    pub fn resolve(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &mut Dynamics<L>, open: u32) {
+    pub fn solve_contacts(
+        &mut self,
+        tree: &Tree,
+        pose: &Pose<L>,
+        dynamics: &mut Dynamics<L>,
+        open: u32,
+    ) {
         if self.near.iter().all(|near| near.lanes & open == 0) {
             return;
         }
-        self.halve(tree, pose, dynamics);
-        self.couple(tree, open);
+        self.prepare(tree, pose, dynamics);
+        self.update_delassus(tree, open);
         self.wrenches.clear();
         self.wrenches.resize(self.near.len(), [L::ZERO; 6]);
         for lane in (0..LANES).filter(|lane| open >> lane & 1 == 1) {
             self.solve(lane);
         }
-        self.apply(tree, &mut dynamics.change);
+        self.apply(tree, &mut dynamics.delta);
     }
 
-    /// Halves the Jacobians of the bodies, and takes their twists from what the step does without contacts.
+    /// Half-solves the Jacobians of all bodies near the ground, and computes their twists without contacts: J (q̇ + Δ), where
+    /// J Δ = J L⁻¹ (L⁻ᵀ b) is the product of the two halves.
     #[inline(always)]
-    fn halve(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &Dynamics<L>) {
-        // What is beyond a path is never read.
-        self.halves
+    fn prepare(&mut self, tree: &Tree, pose: &Pose<L>, dynamics: &Dynamics<L>) {
+        // Entries beyond a body's path are never read.
+        self.half_jacobians
             .resize(self.near.len() * self.width, [L::ZERO; 6]);
         self.twists.clear();
-        let halves = self.halves.chunks_exact_mut(self.width);
-        for (near, half) in self.near.iter().zip(halves) {
+        let half_jacobians = self.half_jacobians.chunks_exact_mut(self.width);
+        for (near, half) in self.near.iter().zip(half_jacobians) {
             let path = &tree.nodes[near.node].path;
-            let origin = &pose.places[near.node].origin;
+            let origin = &pose.frames[near.node].origin;
             for (half, &k) in half.iter_mut().zip(path) {
                 *half = rows(&pose.axes[k], origin);
             }
             dynamics
                 .factor
-                .halve_rows(tree, path, &mut half[..path.len()]);
-            let mut twist = rows(&dynamics.motions[near.node], origin);
+                .solve_transposed_rows(tree, path, &mut half[..path.len()]);
+            let mut twist = rows(&dynamics.velocities[near.node], origin);
             for (half, &k) in half.iter().zip(path) {
-                let change = dynamics.change[k];
+                let change = dynamics.delta[k];
                 for i in 0..6 {
                     twist[i] += half[i] * change;
                 }
@@ -166,12 +183,13 @@ impl<L: Lanes> Contacts<L> {
         }
     }
 
-    /// Of the pairs that a lane in `open` has on the ground together.
+    /// Computes the blocks of all pairs of bodies that some character in `open` has on the ground together. Only coordinates
+    /// that move both bodies contribute: those at the beginning of both paths.
     #[inline(always)]
-    fn couple(&mut self, tree: &Tree, open: u32) {
+    fn update_delassus(&mut self, tree: &Tree, open: u32) {
         let pairs = pair(self.near.len(), 0);
-        if self.coupling.len() < pairs {
-            self.coupling.resize(pairs, [[L::ZERO; 6]; 6]);
+        if self.delassus.len() < pairs {
+            self.delassus.resize(pairs, [[L::ZERO; 6]; 6]);
         }
         for a in 0..self.near.len() {
             for b in 0..=a {
@@ -180,9 +198,9 @@ impl<L: Lanes> Contacts<L> {
                     continue;
                 }
                 let shared = tree.shared(x.node, y.node);
-                let x = &self.halves[a * self.width..a * self.width + shared];
-                let y = &self.halves[b * self.width..b * self.width + shared];
-                for (k, sums) in self.coupling[pair(a, b)].iter_mut().enumerate() {
+                let x = &self.half_jacobians[a * self.width..a * self.width + shared];
+                let y = &self.half_jacobians[b * self.width..b * self.width + shared];
+                for (k, sums) in self.delassus[pair(a, b)].iter_mut().enumerate() {
                     *sums = [L::ZERO; 6];
                     for (x, y) in x.iter().zip(y) {
                         for i in 0..6 {
@@ -194,21 +212,22 @@ impl<L: Lanes> Contacts<L> {
         }
     }
 
-    /// One character's impulses, added up by body.
+    /// Solves for one character's impulses and writes the sums by body to its lane.
     #[inline(always)]
     fn solve(&mut self, lane: usize) {
         let solver = &mut self.solvers[lane];
         if solver.points.is_empty() {
             return;
         }
-        solver.coupling.clear();
+        // Take this character's blocks out of the lanes. A pair is stored once; the block of the swapped pair is its transpose.
+        solver.delassus.clear();
         for a in 0..solver.bodies.len() {
             let near = solver.bodies[a].near;
             solver.bodies[a].twist = twist(&self.twists[near], lane);
             solver.bodies[a].wrench = [0.0; 6];
             for b in 0..solver.bodies.len() {
                 let other = solver.bodies[b].near;
-                let answers = &self.coupling[pair(near.max(other), near.min(other))];
+                let answers = &self.delassus[pair(near.max(other), near.min(other))];
                 let mut columns = [Twist::default(); 6];
                 for (k, column) in columns.iter_mut().enumerate() {
                     *column = if near >= other {
@@ -217,7 +236,7 @@ impl<L: Lanes> Contacts<L> {
                         twist(&std::array::from_fn(|i| answers[i][k]), lane)
                     };
                 }
-                solver.coupling.push(columns);
+                solver.delassus.push(columns);
             }
         }
         solver.solve();
@@ -229,10 +248,11 @@ impl<L: Lanes> Contacts<L> {
         }
     }
 
+    /// Adds L⁻ᵀ Jᵀ times the wrenches.
     #[inline(always)]
     fn apply(&self, tree: &Tree, change: &mut [L]) {
-        let halves = self.halves.chunks_exact(self.width);
-        for ((near, wrench), half) in self.near.iter().zip(&self.wrenches).zip(halves) {
+        let half_jacobians = self.half_jacobians.chunks_exact(self.width);
+        for ((near, wrench), half) in self.near.iter().zip(&self.wrenches).zip(half_jacobians) {
             for (half, &k) in half.iter().zip(&tree.nodes[near.node].path) {
                 for i in 0..6 {
                     change[k] += half[i] * wrench[i];
@@ -241,14 +261,14 @@ impl<L: Lanes> Contacts<L> {
         }
     }
 
-    /// The ground's impulses on the characters.
-    pub fn impulse(&self, pose: &Pose<L>) -> Force<L> {
-        let mut sum = Force::ZERO;
+    /// The ground's impulses on each character together, about the root's origin.
+    pub fn impulse(&self, pose: &Pose<L>) -> ForceVector<L> {
+        let mut sum = ForceVector::ZERO;
         for (lane, solver) in self.solvers.iter().enumerate() {
             let [mut moment, mut force] = [Vector3::zeros(); 2];
             for point in &solver.points {
                 let node = solver.bodies[point.body].node;
-                let at = pose.places[node].origin.of(lane) + point.arm;
+                let at = pose.frames[node].origin.get(lane) + point.arm;
                 moment += at.cross(&point.impulse);
                 force += point.impulse;
             }
@@ -258,8 +278,8 @@ impl<L: Lanes> Contacts<L> {
         sum
     }
 
-    /// Marks the nodes that push on the ground.
-    pub fn mark(&self, lane: usize, pressed: &mut [bool]) {
+    /// Sets the flags of the nodes that press on the ground.
+    pub fn mark_pressing(&self, lane: usize, pressed: &mut [bool]) {
         let solver = &self.solvers[lane];
         for point in &solver.points {
             let node = solver.bodies[point.body].node;
@@ -268,37 +288,39 @@ impl<L: Lanes> Contacts<L> {
     }
 }
 
-/// Lanes in which a node may have points near the ground.
+/// The lanes, as bits, in which a node may have points near the ground: a bound by the ball that holds all its points, and by
+/// the fastest downward velocity within it.
 #[inline(always)]
 fn reaches_ground<L: Lanes>(
     node: &Node,
     pose: &Pose<L>,
-    motion: &Motion<L>,
+    velocity: &MotionVector<L>,
     (i, dt): (usize, f32),
 ) -> u32 {
-    let (place, reach) = (&pose.places[i], L::splat(node.reach));
-    let fastest = motion.angular.norm() * reach - motion.at(&place.origin).z;
-    let lowest = place.origin.z + pose.origin.z - reach;
+    let (frame, reach) = (&pose.frames[i], L::splat(node.reach));
+    let fastest = velocity.angular.norm() * reach - velocity.velocity_at(&frame.origin).z;
+    let lowest = frame.origin.z + pose.origin.z - reach;
     let soon = lowest - L::splat(dt) * fastest.max(L::ZERO);
-    L::splat(NEAR).at_least(soon).bits()
+    L::splat(MARGIN).at_least(soon).bits()
 }
 
-/// Where a pair of bodies is kept, `b` no later than `a`.
+/// Index of the pair of bodies `b` ≤ `a`.
 fn pair(a: usize, b: usize) -> usize {
     a * (a + 1) / 2 + b
 }
 
-/// Of a motion: turning, and velocity at `origin`.
+/// The six components of a twist: angular velocity, and velocity of the point at `origin`.
 #[inline(always)]
-fn rows<L: Lanes>(motion: &Motion<L>, origin: &Vec3<L>) -> [L; 6] {
-    let (turning, velocity) = (&motion.angular, motion.at(origin));
+fn rows<L: Lanes>(velocity: &MotionVector<L>, origin: &Vec3<L>) -> [L; 6] {
+    let (angular, linear) = (&velocity.angular, velocity.velocity_at(origin));
     [
-        turning.x, turning.y, turning.z, velocity.x, velocity.y, velocity.z,
+        angular.x, angular.y, angular.z, linear.x, linear.y, linear.z,
     ]
 }
 
+/// One lane of a twist.
 #[inline(always)]
 fn twist<L: Lanes>(parts: &[L; 6], lane: usize) -> Twist {
-    let [a, b, c, x, y, z] = parts.each_ref().map(|part| part.of(lane));
+    let [a, b, c, x, y, z] = parts.each_ref().map(|part| part.get(lane));
     [f32x4::from([a, b, c, 0.0]), f32x4::from([x, y, z, 0.0])]
 }

@@ -1,21 +1,22 @@
-//! Eight numbers at a time: the same one of each of eight characters.
+//! Eight numbers at a time: the same quantity of eight characters, one in each lane of a vector.
 //!
-//! A step takes the same way through the tree whatever the character does, so eight of them go it together. All that
-//! computes with lanes is inlined into [`on_widest`], so that it is compiled for the instructions that the processor was
-//! found to have. No operation is fused with another, so all kinds give the same bits.
+//! A step goes through the tree in the same order whatever the character does, so that eight characters can take it
+//! together. All code that computes with lanes is `inline(always)` into [`on_widest_lanes`], where it is compiled for the
+//! instructions that the processor was found to have. Each operation rounds by itself (no fused multiply-add), so all
+//! kinds of lanes give the same bits.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use wide::f32x8;
 
-/// How many characters move together: in the air in little more time than one takes, on the ground in two to three times
-/// it.
+/// Number of characters that step together: as many f32 as an AVX register holds. Eight in the air take little more time
+/// than one; eight on the ground take two to three times as long (`cargo bench --bench physics`).
 pub const LANES: usize = 8;
 
-/// Eight numbers, or eight masks: all bits or none.
+/// Eight numbers, or eight masks, each of which has all bits set or none.
 ///
 /// # Safety
-/// The type is eight packed f32, and its bits may be any.
+/// The type has to consist of eight packed f32, and any bits have to be valid for it.
 pub(super) unsafe trait Lanes:
     Copy
     + Debug
@@ -31,49 +32,50 @@ pub(super) unsafe trait Lanes:
     + SubAssign
 {
     const ZERO: Self;
+    /// The same number in every lane.
     fn splat(x: f32) -> Self;
     fn sqrt(self) -> Self;
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
-    /// A mask.
+    /// Mask of the lanes in which `self < other`; NaN compares as false.
     fn below(self, other: Self) -> Self;
-    /// A mask.
+    /// Mask of the lanes in which `self >= other`; NaN compares as false.
     fn at_least(self, other: Self) -> Self;
-    /// Of two masks.
+    /// The bits that both masks have.
     fn and(self, other: Self) -> Self;
-    /// `yes` where this mask is set.
-    fn choose(self, yes: Self, no: Self) -> Self;
-    /// Of a mask: bit k is that of lane k.
+    /// Of each lane, `yes` where this mask is set and `no` elsewhere.
+    fn select(self, yes: Self, no: Self) -> Self;
+    /// A mask as bits: bit k belongs to lane k.
     fn bits(self) -> u32;
 
-    /// A mask of the zeros, of either sign.
+    /// Mask of the lanes that are zero, of either sign.
     #[inline(always)]
     fn is_zero(self) -> Self {
         Self::ZERO.at_least(self.abs())
     }
 
     #[inline(always)]
-    fn of(&self, lane: usize) -> f32 {
-        self.all()[lane]
+    fn get(&self, lane: usize) -> f32 {
+        self.as_array()[lane]
     }
 
     #[inline(always)]
     fn set(&mut self, lane: usize, x: f32) {
-        self.all_mut()[lane] = x;
+        self.as_array_mut()[lane] = x;
     }
 
     #[inline(always)]
-    fn all(&self) -> &[f32; LANES] {
+    fn as_array(&self) -> &[f32; LANES] {
         const { assert!(size_of::<Self>() == size_of::<[f32; LANES]>()) };
-        // SAFETY: the trait's promise; an f32 needs no more than its alignment.
+        // SAFETY: the trait promises eight packed f32, and an array of f32 needs no larger alignment than the vector.
         unsafe { &*std::ptr::from_ref(self).cast() }
     }
 
     #[inline(always)]
-    fn all_mut(&mut self) -> &mut [f32; LANES] {
+    fn as_array_mut(&mut self) -> &mut [f32; LANES] {
         const { assert!(size_of::<Self>() == size_of::<[f32; LANES]>()) };
-        // SAFETY: as in `all`.
+        // SAFETY: as in `as_array`.
         unsafe { &mut *std::ptr::from_mut(self).cast() }
     }
 
@@ -89,13 +91,13 @@ pub(super) unsafe trait Lanes:
     }
 }
 
-/// What runs on the widest kind of lanes that the processor has.
+/// Work that can run on any kind of lanes.
 pub(super) trait Work {
     fn run<L: Lanes>(self);
 }
 
-/// Runs `work` on AVX's lanes where there are any, else on what every processor has.
-pub(super) fn on_widest(work: impl Work) {
+/// Runs `work` on AVX registers where the processor has AVX2, and else on what every processor has.
+pub(super) fn on_widest_lanes(work: impl Work) {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2")]
@@ -110,7 +112,7 @@ pub(super) fn on_widest(work: impl Work) {
     work.run::<f32x8>();
 }
 
-// SAFETY: `repr(C)` of an AVX register or of two of four f32.
+// SAFETY: `f32x8` is `repr(C)` of one AVX register, or of two registers of four f32.
 unsafe impl Lanes for f32x8 {
     const ZERO: Self = f32x8::ZERO;
     #[inline(always)]
@@ -146,7 +148,7 @@ unsafe impl Lanes for f32x8 {
         self & other
     }
     #[inline(always)]
-    fn choose(self, yes: Self, no: Self) -> Self {
+    fn select(self, yes: Self, no: Self) -> Self {
         self.select(yes, no)
     }
     #[inline(always)]
@@ -161,8 +163,8 @@ mod avx {
     use std::arch::x86_64::*;
     use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-    /// One register of AVX. Only [`super::on_widest`] makes any, where the processor has AVX2: what all the SAFETY lines
-    /// here stand on.
+    /// One AVX register. Only [`super::on_widest_lanes`] makes values of this type, after it has found that the processor has
+    /// AVX2. All SAFETY comments below rely on that.
     #[derive(Clone, Copy, Debug)]
     #[repr(transparent)]
     pub(super) struct Avx(__m256);
@@ -202,7 +204,7 @@ mod avx {
         }
     }
 
-    // SAFETY: `repr(transparent)` of a register of eight f32.
+    // SAFETY: the type is `repr(transparent)` over a register of eight f32.
     unsafe impl Lanes for Avx {
         // SAFETY: all bits 0 are eight zeros.
         const ZERO: Self = Avx(unsafe { std::mem::zeroed() });
@@ -248,7 +250,7 @@ mod avx {
             Avx(unsafe { _mm256_and_ps(self.0, other.0) })
         }
         #[inline(always)]
-        fn choose(self, yes: Self, no: Self) -> Self {
+        fn select(self, yes: Self, no: Self) -> Self {
             // SAFETY: see `Avx`.
             Avx(unsafe { _mm256_blendv_ps(no.0, yes.0, self.0) })
         }

@@ -1,55 +1,63 @@
-//! Coordinates of eight characters, and where they put them.
+//! Joint coordinates of eight characters, and their forward kinematics.
 
 use super::super::state::LinkState;
-use super::algebra::{Rotation, Turn, Vec3};
+use super::algebra::{Quat, Rotation, Vec3};
 use super::lanes::Lanes;
-use super::spatial::Motion;
+use super::spatial::MotionVector;
 use super::state::State;
 use super::tree::{Joint, Node, Tree};
 
-/// Where a node is in the world, seen from the root's origin.
+/// The frame of a node: axes of the world, positions from the root's origin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place<L> {
-    pub turn: Turn<L>,
+pub(super) struct Frame<L> {
+    /// World from node: the rotation.
+    pub rotation: Quat<L>,
+    /// The same as a matrix.
     pub matrix: Rotation<L>,
+    /// Origin of the frame, metres.
     pub origin: Vec3<L>,
-    /// Where its joint turns.
+    /// Centre of the joint that connects it to its parent, metres.
     pub pivot: Vec3<L>,
 }
 
-impl<L: Lanes> Place<L> {
+impl<L: Lanes> Frame<L> {
+    /// A point of the node, given in its own frame, seen from the root's origin.
     #[inline(always)]
     pub fn point(&self, local: &Vec3<L>) -> Vec3<L> {
         self.origin + self.matrix.times(local)
     }
 }
 
-/// Where a tree is and how it moves.
+/// Coordinates and velocities of a tree, and the frames and joint axes that follow from them.
 #[derive(Clone, Debug)]
 pub(super) struct Pose<L> {
-    /// The root's place in the world. All else is relative to it, so that nothing is lost far from the world's origin.
+    /// Position of the root's origin in the world, metres. Everything else is relative to it, so that f32 loses no precision
+    /// far from the world's origin.
     pub origin: Vec3<L>,
-    /// Of every node that is no hinge, in its parent from how it rests there; the root's in the world.
-    pub turns: Vec<Turn<L>>,
-    /// Of the hinges, radians.
+    /// `[nodes]`: joint rotation, the identity at rest; for the root, its orientation in the world. Unused for hinges.
+    pub rotations: Vec<Quat<L>>,
+    /// `[nodes]`: angle of a hinge, radians; unused for other joints.
     pub angles: Vec<L>,
-    /// By coordinate.
+    /// `[coordinates]`: m/s for the root's translations, else rad/s.
     pub velocity: Vec<L>,
-    pub places: Vec<Place<L>>,
-    /// What a unit of every coordinate's velocity does, about the root's origin.
-    pub axes: Vec<Motion<L>>,
+    /// `[nodes]`.
+    pub frames: Vec<Frame<L>>,
+    /// `[coordinates]`: the motion that a unit of each coordinate's velocity makes, about the root's origin. These are the
+    /// columns of RBDA's motion subspace matrices S.
+    pub axes: Vec<MotionVector<L>>,
 }
 
 impl<L: Lanes> Pose<L> {
     pub fn new(tree: &Tree) -> Self {
         let (nodes, coordinates) = (tree.nodes.len(), tree.coordinates.len());
-        let nowhere = Place {
-            turn: Turn::identity(),
-            matrix: Turn::identity().matrix(),
+        let nowhere = Frame {
+            rotation: Quat::identity(),
+            matrix: Quat::identity().to_matrix(),
             origin: Vec3::ZERO,
             pivot: Vec3::ZERO,
         };
-        let mut axes = vec![Motion::ZERO; coordinates];
+        // The root's axes are the world's and never change.
+        let mut axes = vec![MotionVector::ZERO; coordinates];
         let one = L::splat(1.0);
         let units = [
             Vec3::new(one, L::ZERO, L::ZERO),
@@ -62,17 +70,18 @@ impl<L: Lanes> Pose<L> {
         }
         Pose {
             origin: Vec3::ZERO,
-            turns: vec![Turn::identity(); nodes],
+            rotations: vec![Quat::identity(); nodes],
             angles: vec![L::ZERO; nodes],
             velocity: vec![L::ZERO; coordinates],
-            places: vec![nowhere; nodes],
+            frames: vec![nowhere; nodes],
             axes,
         }
     }
 
-    pub fn take(&mut self, lane: usize, state: &State) {
+    /// Puts a character's coordinates into a lane.
+    pub fn gather(&mut self, lane: usize, state: &State) {
         self.origin.set(lane, &state.origin);
-        for (own, turn) in self.turns.iter_mut().zip(&state.turns) {
+        for (own, turn) in self.rotations.iter_mut().zip(&state.rotations) {
             own.set(lane, turn);
         }
         for (own, angle) in self.angles.iter_mut().zip(&state.angles) {
@@ -83,71 +92,76 @@ impl<L: Lanes> Pose<L> {
         }
     }
 
-    pub fn give(&self, lane: usize, state: &mut State) {
-        state.origin = self.origin.of(lane);
-        for (turn, own) in state.turns.iter_mut().zip(&self.turns) {
-            *turn = own.of(lane);
+    /// Takes a character's coordinates out of a lane.
+    pub fn scatter(&self, lane: usize, state: &mut State) {
+        state.origin = self.origin.get(lane);
+        for (turn, own) in state.rotations.iter_mut().zip(&self.rotations) {
+            *turn = own.get(lane);
         }
         for (angle, own) in state.angles.iter_mut().zip(&self.angles) {
-            *angle = own.of(lane);
+            *angle = own.get(lane);
         }
         for (rate, own) in state.velocity.iter_mut().zip(&self.velocity) {
-            *rate = own.of(lane);
+            *rate = own.get(lane);
         }
     }
 
-    /// States of all nodes in the world.
-    pub fn read(&self, motions: &[Motion<L>], lane: usize, states: &mut [LinkState]) {
-        let origin = self.origin.of(lane);
-        for ((state, place), motion) in states.iter_mut().zip(&self.places).zip(motions) {
-            let (at, angular) = (place.origin.of(lane), motion.angular.of(lane));
-            state.pose.rotation = place.turn.of(lane);
+    /// Writes the states of all nodes in the world, given their velocities about the root's origin.
+    pub fn read(&self, velocities: &[MotionVector<L>], lane: usize, states: &mut [LinkState]) {
+        let origin = self.origin.get(lane);
+        for ((state, frame), motion) in states.iter_mut().zip(&self.frames).zip(velocities) {
+            let (at, angular) = (frame.origin.get(lane), motion.angular.get(lane));
+            state.pose.rotation = frame.rotation.get(lane);
             state.pose.translation.vector = at + origin;
-            state.linear = motion.linear.of(lane) + angular.cross(&at);
+            state.linear = motion.linear.get(lane) + angular.cross(&at);
             state.angular = angular;
         }
     }
 
-    /// Moves the coordinates on at their velocity for `dt` seconds.
+    /// Moves the coordinates on at their velocities for `dt` seconds. Rotations are normalised so that rounding doesn't add up.
     #[inline(always)]
-    pub fn advance(&mut self, tree: &Tree, dt: L) {
+    pub fn integrate(&mut self, tree: &Tree, dt: L) {
         for (i, node) in tree.nodes.iter().enumerate() {
             let k = node.first;
             match node.joint {
                 Joint::Free => {
+                    // The root's angular velocity is in world axes, so the step multiplies from the left.
                     self.origin += self.rate(k) * dt;
-                    let turn = Turn::by(&(self.rate(k + 3) * dt));
-                    self.turns[i] = turn.times(&self.turns[i]).normalized();
+                    let step = Quat::from_rotation_vector(&(self.rate(k + 3) * dt));
+                    self.rotations[i] = step.times(&self.rotations[i]).normalized();
                 }
                 Joint::Ball => {
-                    let turn = Turn::by(&(self.rate(k) * dt));
-                    self.turns[i] = self.turns[i].times(&turn).normalized();
+                    // A ball's is in the node's own axes, so it multiplies from the right.
+                    let step = Quat::from_rotation_vector(&(self.rate(k) * dt));
+                    self.rotations[i] = self.rotations[i].times(&step).normalized();
                 }
                 Joint::Hinge(..) => self.angles[i] += self.velocity[k] * dt,
             }
         }
     }
 
-    /// Places and axes from the coordinates.
+    /// Computes frames and axes from the coordinates, from the root outwards.
     #[inline(always)]
-    pub fn place(&mut self, tree: &Tree) {
+    pub fn forward_kinematics(&mut self, tree: &Tree) {
         for (i, node) in tree.nodes.iter().enumerate() {
             let Some(parent) = node.parent else {
-                self.places[i].turn = self.turns[i];
-                self.places[i].matrix = self.turns[i].matrix();
+                // Its origin and pivot stay zero: all positions are seen from there.
+                self.frames[i].rotation = self.rotations[i];
+                self.frames[i].matrix = self.rotations[i].to_matrix();
                 continue;
             };
-            let parent = self.places[parent];
+            let parent = self.frames[parent];
             let own = match node.joint {
-                Joint::Hinge(axis, _) => Turn::about(&Vec3::splat(&axis), self.angles[i]),
-                _ => self.turns[i],
+                Joint::Hinge(axis, _) => Quat::from_axis_angle(&Vec3::splat(&axis), self.angles[i]),
+                _ => self.rotations[i],
             };
-            let turn = parent.turn.times(&Turn::splat(&node.rest)).times(&own);
-            let matrix = turn.matrix();
+            let rotation = parent.rotation.times(&Quat::splat(&node.rest)).times(&own);
+            let matrix = rotation.to_matrix();
+            // The joint's centre is a point of both bodies, which gives the origin of this one.
             let pivot = parent.point(&Vec3::splat(&node.pivot));
             let origin = pivot - matrix.times(&Vec3::splat(&node.anchor));
-            self.places[i] = Place {
-                turn,
+            self.frames[i] = Frame {
+                rotation,
                 matrix,
                 origin,
                 pivot,
@@ -155,30 +169,32 @@ impl<L: Lanes> Pose<L> {
             match node.joint {
                 Joint::Hinge(axis, _) => {
                     let axis = matrix.times(&Vec3::splat(&axis));
-                    self.axes[node.first] = Motion::about(axis, &pivot);
+                    self.axes[node.first] = MotionVector::about_axis(axis, &pivot);
                 }
                 _ => {
                     for k in 0..3 {
-                        self.axes[node.first + k] = Motion::about(matrix.0[k], &pivot);
+                        self.axes[node.first + k] = MotionVector::about_axis(matrix.0[k], &pivot);
                     }
                 }
             }
         }
     }
 
-    /// What a node's joint does by itself.
+    /// Velocity of a node relative to its parent: S q̇ (RBDA's joint velocity v_J).
     #[inline(always)]
-    pub fn own_motion(&self, i: usize, node: &Node) -> Motion<L> {
-        let place = &self.places[i];
+    pub fn joint_velocity(&self, i: usize, node: &Node) -> MotionVector<L> {
+        let frame = &self.frames[i];
         match node.joint {
-            Joint::Free => Motion {
+            Joint::Free => MotionVector {
                 angular: self.rate(3),
                 linear: self.rate(0),
             },
-            Joint::Ball => Motion::about(place.matrix.times(&self.rate(node.first)), &place.pivot),
+            Joint::Ball => {
+                MotionVector::about_axis(frame.matrix.times(&self.rate(node.first)), &frame.pivot)
+            }
             Joint::Hinge(..) => {
                 let (axis, rate) = (&self.axes[node.first], self.velocity[node.first]);
-                Motion {
+                MotionVector {
                     angular: axis.angular * rate,
                     linear: axis.linear * rate,
                 }
@@ -186,7 +202,7 @@ impl<L: Lanes> Pose<L> {
         }
     }
 
-    /// Three velocities in a row.
+    /// Three velocity coordinates in a row as a vector.
     #[inline(always)]
     fn rate(&self, k: usize) -> Vec3<L> {
         Vec3::new(self.velocity[k], self.velocity[k + 1], self.velocity[k + 2])

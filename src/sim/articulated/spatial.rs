@@ -1,204 +1,213 @@
-//! Spatial vectors of Featherstone's "Rigid Body Dynamics Algorithms", chapter 2, all in world axes and about one point,
-//! of eight characters.
+//! Spatial vectors and inertias of eight characters: chapter 2 of Featherstone, "Rigid Body Dynamics Algorithms", Springer
+//! 2008, which comments in this folder call RBDA.
+//!
+//! All of them are in world axes and about one common point, the root's origin, so that vectors of different bodies can be
+//! added and multiplied without transforms between them.
 
 use super::algebra::{Symmetric, Vec3};
 use super::lanes::Lanes;
 use std::ops::{Add, AddAssign, Mul, Sub};
 
-/// A velocity or an acceleration: of the turning, and of the point of the body that is at the common point.
+/// A velocity or an acceleration: angular, rad/s, and linear, m/s, of the point of the body that is at the common point just
+/// now (RBDA's motion vector).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion<L> {
+pub(super) struct MotionVector<L> {
     pub angular: Vec3<L>,
     pub linear: Vec3<L>,
 }
 
-/// A force or a momentum: its moment about the common point, and itself.
+/// A force, an impulse or a momentum, and its moment about the common point (RBDA's force vector).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Force<L> {
+pub(super) struct ForceVector<L> {
     pub moment: Vec3<L>,
     pub force: Vec3<L>,
 }
 
-/// Mass, first moment of mass and inertia about the common point.
+/// The inertia of a rigid body about the common point (RBDA §2.13): a linear map from velocity to momentum.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inertia<L> {
+pub(super) struct SpatialInertia<L> {
+    /// kg.
     pub mass: L,
-    first: Vec3<L>,
-    second: Symmetric<L>,
+    /// Mass times centre of mass, kg·m.
+    first_moment: Vec3<L>,
+    /// Rotational inertia about the common point, kg·m².
+    rotational: Symmetric<L>,
 }
 
-impl<L: Lanes> Motion<L> {
-    pub const ZERO: Self = Motion {
+impl<L: Lanes> MotionVector<L> {
+    pub const ZERO: Self = MotionVector {
         angular: Vec3::ZERO,
         linear: Vec3::ZERO,
     };
 
-    /// Turning about `axis` through the point `at`.
+    /// Rotation at unit rate about the unit vector `axis` through the point `at`.
     #[inline(always)]
-    pub fn about(axis: Vec3<L>, at: &Vec3<L>) -> Self {
-        Motion {
+    pub fn about_axis(axis: Vec3<L>, at: &Vec3<L>) -> Self {
+        MotionVector {
             angular: axis,
             linear: at.cross(&axis),
         }
     }
 
-    /// Velocity of the body's point that is at `point`.
+    /// Linear velocity of the body's point that is at `point`.
     #[inline(always)]
-    pub fn at(&self, point: &Vec3<L>) -> Vec3<L> {
+    pub fn velocity_at(&self, point: &Vec3<L>) -> Vec3<L> {
         self.linear + self.angular.cross(point)
     }
 
-    /// Rate at which `carried` changes when it moves with this motion (RBDA eq. 2.31).
+    /// Rate of change of a motion vector that is carried along at this velocity, v × m (RBDA eq. 2.31).
     #[inline(always)]
     pub fn cross(&self, carried: &Self) -> Self {
-        Motion {
+        MotionVector {
             angular: self.angular.cross(&carried.angular),
             linear: self.angular.cross(&carried.linear) + self.linear.cross(&carried.angular),
         }
     }
 
-    /// The same of a force (RBDA eq. 2.32).
+    /// Rate of change of a force vector that is carried along at this velocity, v ×* f (RBDA eq. 2.32).
     #[inline(always)]
-    pub fn cross_force(&self, carried: &Force<L>) -> Force<L> {
-        Force {
+    pub fn cross_force(&self, carried: &ForceVector<L>) -> ForceVector<L> {
+        ForceVector {
             moment: self.angular.cross(&carried.moment) + self.linear.cross(&carried.force),
             force: self.angular.cross(&carried.force),
         }
     }
 
-    /// Power of a force in this motion.
+    /// Power of a force at this velocity: the scalar product of a motion and a force vector.
     #[inline(always)]
-    pub fn dot(&self, force: &Force<L>) -> L {
+    pub fn dot(&self, force: &ForceVector<L>) -> L {
         self.angular.dot(&force.moment) + self.linear.dot(&force.force)
     }
 }
 
-impl<L: Lanes> Inertia<L> {
-    pub const ZERO: Self = Inertia {
+impl<L: Lanes> SpatialInertia<L> {
+    pub const ZERO: Self = SpatialInertia {
         mass: L::ZERO,
-        first: Vec3::ZERO,
-        second: Symmetric::ZERO,
+        first_moment: Vec3::ZERO,
+        rotational: Symmetric::ZERO,
     };
 
-    /// Of a body with its centre of mass at `com` and `central` inertia about that.
+    /// The inertia of a body with its centre of mass at `com`, and `central` its rotational inertia about that.
     #[inline(always)]
     pub fn new(mass: L, com: &Vec3<L>, central: Symmetric<L>) -> Self {
-        Inertia {
+        SpatialInertia {
             mass,
-            first: *com * mass,
-            second: central + Symmetric::parallel(mass, com),
+            first_moment: *com * mass,
+            rotational: central + Symmetric::point_inertia(mass, com),
         }
     }
 
-    /// Momentum of a motion.
+    /// The momentum at a velocity.
     #[inline(always)]
-    pub fn times(&self, motion: &Motion<L>) -> Force<L> {
-        Force {
-            moment: self.second.times(&motion.angular) + self.first.cross(&motion.linear),
-            force: motion.linear * self.mass + motion.angular.cross(&self.first),
+    pub fn times(&self, motion: &MotionVector<L>) -> ForceVector<L> {
+        ForceVector {
+            moment: self.rotational.times(&motion.angular)
+                + self.first_moment.cross(&motion.linear),
+            force: motion.linear * self.mass + motion.angular.cross(&self.first_moment),
         }
     }
 
+    /// Centre of mass, from the common point.
     #[inline(always)]
     pub fn com(&self) -> Vec3<L> {
-        self.first * (L::splat(1.0) / self.mass)
+        self.first_moment * (L::splat(1.0) / self.mass)
     }
 
-    /// The motion of this momentum.
+    /// The velocity at which the body has this momentum: ω from the moment about the centre of mass, then the linear part.
     #[inline(always)]
-    pub fn motion_of(&self, momentum: &Force<L>) -> Motion<L> {
+    pub fn solve(&self, momentum: &ForceVector<L>) -> MotionVector<L> {
         let com = self.com();
-        let central = self.second + Symmetric::parallel(-self.mass, &com);
+        let central = self.rotational + Symmetric::point_inertia(-self.mass, &com);
         let spin = momentum.moment - com.cross(&momentum.force);
         let angular = central.solve(&spin);
-        Motion {
+        MotionVector {
             angular,
             linear: momentum.force * (L::splat(1.0) / self.mass) + com.cross(&angular),
         }
     }
 }
 
-impl<L: Lanes> Force<L> {
-    pub const ZERO: Self = Force {
+impl<L: Lanes> ForceVector<L> {
+    pub const ZERO: Self = ForceVector {
         moment: Vec3::ZERO,
         force: Vec3::ZERO,
     };
 
-    /// An impulse or a force at a point.
+    /// A force or an impulse that acts at a point.
     #[inline(always)]
-    pub fn at(force: Vec3<L>, point: &Vec3<L>) -> Self {
-        Force {
+    pub fn at_point(force: Vec3<L>, point: &Vec3<L>) -> Self {
+        ForceVector {
             moment: point.cross(&force),
             force,
         }
     }
 
-    /// The same about another point.
+    /// The same force with its moment about `point`.
     #[inline(always)]
     pub fn about(&self, point: &Vec3<L>) -> Self {
-        Force {
+        ForceVector {
             moment: self.moment - point.cross(&self.force),
             force: self.force,
         }
     }
 }
 
-impl<L: Lanes> Add for Motion<L> {
+impl<L: Lanes> Add for MotionVector<L> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Motion {
+        MotionVector {
             angular: self.angular + other.angular,
             linear: self.linear + other.linear,
         }
     }
 }
 
-impl<L: Lanes> Add for Force<L> {
+impl<L: Lanes> Add for ForceVector<L> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Force {
+        ForceVector {
             moment: self.moment + other.moment,
             force: self.force + other.force,
         }
     }
 }
 
-impl<L: Lanes> Sub for Force<L> {
+impl<L: Lanes> Sub for ForceVector<L> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Force {
+        ForceVector {
             moment: self.moment - other.moment,
             force: self.force - other.force,
         }
     }
 }
 
-impl<L: Lanes> Mul<L> for Force<L> {
+impl<L: Lanes> Mul<L> for ForceVector<L> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: L) -> Self {
-        Force {
+        ForceVector {
             moment: self.moment * factor,
             force: self.force * factor,
         }
     }
 }
 
-impl<L: Lanes> AddAssign for Force<L> {
+impl<L: Lanes> AddAssign for ForceVector<L> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<L: Lanes> AddAssign for Inertia<L> {
+impl<L: Lanes> AddAssign for SpatialInertia<L> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         self.mass += other.mass;
-        self.first += other.first;
-        self.second = self.second + other.second;
+        self.first_moment += other.first_moment;
+        self.rotational = self.rotational + other.rotational;
     }
 }

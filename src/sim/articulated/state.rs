@@ -1,29 +1,32 @@
-//! What a step of one character leaves to the next.
+//! What one character keeps from step to step.
 
 use super::super::state::{LinkState, Target};
 use super::tree::{Joint, Tree};
 use crate::skeleton::twist;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+/// State of one character.
 #[derive(Clone, Debug)]
 pub(super) struct State {
-    /// The root's place in the world.
+    /// Position of the root's origin in the world, metres.
     pub origin: Vector3<f32>,
-    /// Of every node, in its parent from how it rests there; the root's in the world. A hinge has its angle instead.
-    pub turns: Vec<UnitQuaternion<f32>>,
+    /// `[nodes]`: joint rotation, the identity at rest; for the root, its orientation in the world. Unused for hinges.
+    pub rotations: Vec<UnitQuaternion<f32>>,
+    /// `[nodes]`: angle of a hinge, radians; unused for other joints.
     pub angles: Vec<f32>,
-    /// By coordinate.
+    /// `[coordinates]`: m/s for the root's translations, else rad/s.
     pub velocity: Vec<f32>,
-    /// Where drives aim, by node; of a hinge the real part is its angle.
+    /// `[nodes]`: targets of the drives as joint rotations. For a hinge the real part holds its angle.
     pub targets: Vec<UnitQuaternion<f32>>,
-    /// Drives that were found beyond their limit: the sign of their torque, else 0.
+    /// `[coordinates]`: sign of the torque of a drive that the last step held at its limit, else 0.
     pub saturated: Vec<f32>,
-    /// Of the ground, by point.
+    /// `[points]`: impulses of the ground in the last step, world axes, N·s. The next step starts from them.
     pub impulses: Vec<Vector3<f32>>,
-    /// Impulses at the centres of mass of nodes that the next step gives.
+    /// Node, and impulse at its centre of mass, world axes, N·s, that the next step applies.
     pub pushes: Vec<(usize, Vector3<f32>)>,
-    /// Factors of all masses, and of friction.
+    /// Factor of all masses and inertias.
     pub mass: f32,
+    /// Factor of the friction coefficients.
     pub friction: f32,
 }
 
@@ -32,7 +35,7 @@ impl State {
         let (nodes, coordinates) = (tree.nodes.len(), tree.coordinates.len());
         State {
             origin: Vector3::zeros(),
-            turns: vec![UnitQuaternion::identity(); nodes],
+            rotations: vec![UnitQuaternion::identity(); nodes],
             angles: vec![0.0; nodes],
             velocity: vec![0.0; coordinates],
             targets: vec![UnitQuaternion::identity(); nodes],
@@ -44,7 +47,8 @@ impl State {
         }
     }
 
-    /// Takes the coordinates of `states`, with nothing left of the past; what the joints can't do is left out.
+    /// Takes the joint coordinates of `states`, one per node, and forgets all of the past. What the joints can't express, such
+    /// as a gap at a joint or a hinge turned about another axis, is left out.
     pub fn reset(&mut self, tree: &Tree, states: &[LinkState]) {
         self.saturated.fill(0.0);
         self.impulses.fill(Vector3::zeros());
@@ -55,12 +59,13 @@ impl State {
             let velocity = &mut self.velocity[node.first..node.first + node.dof];
             let Some(parent) = node.parent.map(|p| &states[p]) else {
                 self.origin = state.pose.translation.vector;
-                self.turns[i] = state.pose.rotation;
+                self.rotations[i] = state.pose.rotation;
                 velocity[..3].copy_from_slice(state.linear.as_slice());
                 velocity[3..].copy_from_slice(state.angular.as_slice());
                 continue;
             };
             let turn = node.rest.inverse() * parent.pose.rotation.inverse() * state.pose.rotation;
+            // Velocity of the joint: relative angular velocity in the child's axes.
             let apart = state.angular - parent.angular;
             let rate = state.pose.rotation.inverse_transform_vector(&apart);
             match node.joint {
@@ -69,14 +74,15 @@ impl State {
                     velocity[0] = rate.dot(&axis);
                 }
                 _ => {
-                    self.turns[i] = turn;
+                    self.rotations[i] = turn;
                     velocity.copy_from_slice(rate.as_slice());
                 }
             }
         }
     }
 
-    pub fn aim(&mut self, targets: &[Target]) {
+    /// Sets the targets of the drives, one per node.
+    pub fn set_targets(&mut self, targets: &[Target]) {
         for (own, target) in self.targets.iter_mut().zip(targets) {
             match target {
                 Target::Free => {}

@@ -1,9 +1,11 @@
-use super::algebra::{Symmetric, Turn, Vec3};
-use super::lanes::{LANES, Lanes, Work, on_widest};
-use super::step::Workspace;
-use super::*;
+use super::algebra::{Quat, Symmetric, Vec3};
+use super::lanes::{LANES, Lanes, Work, on_widest_lanes};
+use super::state::State;
+use super::step::{Lane, Workspace};
+use super::tree::Tree;
+use crate::sim::{Character, LinkState, Settings};
 use crate::skeleton::Skeleton;
-use nalgebra::{Matrix3, UnitQuaternion};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use wide::f32x8;
 
 /// Rotations from none to almost a full turn, about axes that differ.
@@ -23,15 +25,15 @@ fn rotation_vectors() -> Vec<Vector3<f32>> {
 fn turns_by_rotation_vectors_are_those_of_nalgebra() {
     for v in rotation_vectors() {
         let expected = UnitQuaternion::from_scaled_axis(v.cast::<f64>());
-        let turn = Turn::<f32x8>::by(&Vec3::splat(&v));
-        let apart = expected.angle_to(&turn.of(5).cast());
+        let turn = Quat::<f32x8>::from_rotation_vector(&Vec3::splat(&v));
+        let apart = expected.angle_to(&turn.get(5).cast());
         assert!(apart < 5e-7, "{apart} from the turn by {v:?}");
         let shorter = expected.scaled_axis();
-        let negative = Turn {
+        let negative = Quat {
             w: -turn.w,
             v: -turn.v,
         };
-        for back in [turn, negative].map(|turn| turn.vector().of(3)) {
+        for back in [turn, negative].map(|turn| turn.rotation_vector().get(3)) {
             let apart = (back.cast() - shorter).norm();
             assert!(apart < 4e-6, "{back:?} is {apart} from {shorter:?}");
         }
@@ -40,22 +42,22 @@ fn turns_by_rotation_vectors_are_those_of_nalgebra() {
 
 #[test]
 fn half_a_turn_has_a_vector_of_length_pi() {
-    let turn = Turn::<f32x8> {
+    let turn = Quat::<f32x8> {
         w: f32x8::ZERO,
         v: Vec3::splat(&Vector3::y()),
     };
-    let length = turn.vector().of(0).norm();
+    let length = turn.rotation_vector().get(0).norm();
     assert!((length - std::f32::consts::PI).abs() < 1e-6, "{length}");
 }
 
 #[test]
 fn a_rotation_vector_beyond_all_bounds_still_makes_a_unit_quaternion() {
     for length in [7.0, 1e3, 1e12, 1e18] {
-        let turn = Turn::<f32x8>::by(&Vec3::splat(&(Vector3::x() * length)));
-        let norm = (turn.w * turn.w + turn.v.dot(&turn.v)).sqrt().of(0);
+        let turn = Quat::<f32x8>::from_rotation_vector(&Vec3::splat(&(Vector3::x() * length)));
+        let norm = (turn.w * turn.w + turn.v.dot(&turn.v)).sqrt().get(0);
         assert!((norm - 1.0).abs() < 1e-3, "{norm} at {length}");
-        let turn = Turn::about(&Vec3::splat(&Vector3::x()), f32x8::splat(length));
-        let norm = (turn.w * turn.w + turn.v.dot(&turn.v)).sqrt().of(0);
+        let turn = Quat::from_axis_angle(&Vec3::splat(&Vector3::x()), f32x8::splat(length));
+        let norm = (turn.w * turn.w + turn.v.dot(&turn.v)).sqrt().get(0);
         assert!((norm - 1.0).abs() < 1e-3, "{norm} at {length}");
     }
 }
@@ -65,10 +67,10 @@ fn turns_about_an_axis_are_those_of_nalgebra_at_any_angle() {
     let axis = Vector3::new(0.48, -0.6, 0.64);
     for k in -400..400 {
         let angle = k as f32 * 0.0731;
-        let turn = Turn::<f32x8>::about(&Vec3::splat(&axis), f32x8::splat(angle));
+        let turn = Quat::<f32x8>::from_axis_angle(&Vec3::splat(&axis), f32x8::splat(angle));
         let unit = nalgebra::Unit::new_normalize(axis.cast::<f64>());
         let expected = UnitQuaternion::from_axis_angle(&unit, f64::from(angle));
-        let apart = expected.angle_to(&turn.of(0).cast());
+        let apart = expected.angle_to(&turn.get(0).cast());
         assert!(
             apart < 1e-6 * (1.0 + f64::from(angle.abs())),
             "{apart} at {angle}"
@@ -83,10 +85,10 @@ fn a_symmetric_matrix_is_turned_and_solved_as_in_nalgebra() {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.0, 0.7));
     let r = turn.to_rotation_matrix().into_inner();
     let v = Vector3::new(0.5, -1.0, 2.0);
-    let turned = lanes.turned(&Turn::splat(&turn).matrix());
+    let turned = lanes.rotated(&Quat::splat(&turn).to_matrix());
     let expected = r * m * r.transpose() * v;
-    assert!((turned.times(&Vec3::splat(&v)).of(1) - expected).norm() < 1e-5);
-    let solved = turned.solve(&Vec3::splat(&expected)).of(7);
+    assert!((turned.times(&Vec3::splat(&v)).get(1) - expected).norm() < 1e-5);
+    let solved = turned.solve(&Vec3::splat(&expected)).get(7);
     assert!((solved - v).norm() < 1e-5, "{solved:?}");
 }
 
@@ -98,20 +100,21 @@ impl Work for Fall<'_> {
     fn run<L: Lanes>(self) {
         let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
         let character = Character::new(&skeleton).expect("it can be simulated");
-        let mut mover = Articulated::new(&character, Settings::default());
+        let (tree, settings) = (Tree::new(&character), Settings::default());
+        let mut state = State::new(&tree);
         let rest = skeleton.rest_qpos();
         let mut states = character.states(&skeleton, &rest, &vec![0.3; skeleton.nv]);
-        mover.reset(&states);
+        state.reset(&tree, &states);
         let mut contacts = vec![false; character.links.len()];
         let (mut workspace, mut result) = (Workspace::default(), Ok(()));
         for _ in 0..40 {
-            let one = Stepped {
-                mover: &mut mover,
-                states: &mut states,
+            let one = Lane {
+                state: &mut state,
+                links: &mut states,
                 contacts: &mut contacts,
                 result: &mut result,
             };
-            workspace.step_on::<L>(&mut [one]);
+            workspace.step_on::<L>(&tree, &settings, &mut [one]);
         }
         assert!(result.is_ok() && contacts.contains(&true), "it never fell");
         *self.0 = states;
@@ -121,7 +124,7 @@ impl Work for Fall<'_> {
 #[test]
 fn all_kinds_of_lanes_give_the_same_bits() {
     let [mut widest, mut portable] = [const { Vec::new() }; 2];
-    on_widest(Fall(&mut widest));
+    on_widest_lanes(Fall(&mut widest));
     Fall(&mut portable).run::<f32x8>();
     assert_eq!(widest, portable);
 }
@@ -130,8 +133,8 @@ fn all_kinds_of_lanes_give_the_same_bits() {
 fn masks_choose_by_lane() {
     let mask = f32x8::mask(0b1010_0110);
     assert_eq!(mask.bits(), 0b1010_0110);
-    let chosen = mask.choose(f32x8::splat(1.0), f32x8::ZERO);
+    let chosen = mask.select(f32x8::splat(1.0), f32x8::ZERO);
     for lane in 0..LANES {
-        assert_eq!(chosen.of(lane), (0b1010_0110 >> lane & 1) as f32);
+        assert_eq!(chosen.get(lane), (0b1010_0110 >> lane & 1) as f32);
     }
 }

@@ -1,71 +1,82 @@
-//! What doesn't change while a character moves: its joints, their order, and which of them carry which.
+//! The model of a character: what doesn't change while it moves. Bodies, joints, and which coordinates move which body.
 
 use super::super::character::{Character, Link, LinkJoint};
 use crate::skeleton::{Drive, Shape};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-/// How a node turns in its parent.
+/// How a node's joint lets it move in its parent, and along which axes its velocity coordinates are.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joint {
-    /// Along the world's axes, then about them.
+    /// Three translations along the world's axes, then three rotations about them.
     Free,
-    /// About the node's own axes.
+    /// Three rotations about the node's own axes.
     Ball,
-    /// About a unit axis in the node's frame; between the ends of its range, if it has one.
+    /// One rotation about a unit axis in the node's frame, and its range in radians if it is limited.
     Hinge(Vector3<f32>, Option<[f32; 2]>),
 }
 
-/// A link and the joint that carries it.
+/// A link and the joint that connects it to its parent.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
+    /// Index of the parent, which comes before this node; `None` for the root.
     pub parent: Option<usize>,
     pub joint: Joint,
-    /// Rotation of the link in its parent at rest.
+    /// Parent from link, at rest: the rotation.
     pub rest: UnitQuaternion<f32>,
-    /// Where the joint turns, in the parent's frame and in the link's.
+    /// Centre of the joint in the parent's frame, metres.
     pub pivot: Vector3<f32>,
+    /// The same point in the link's frame, metres.
     pub anchor: Vector3<f32>,
-    /// Its first coordinate, and how many it has.
+    /// Index of its first velocity coordinate.
     pub first: usize,
+    /// How many velocity coordinates it has.
     pub dof: usize,
-    /// Coordinates that move it, from the root's to its own.
+    /// The velocity coordinates that move it, from the root's to its own.
     pub path: Vec<usize>,
+    /// kg.
     pub mass: f32,
+    /// Centre of mass in the link's frame, metres.
     pub com: Vector3<f32>,
-    /// About the centre of mass, along the link's axes.
+    /// About the centre of mass, along the link's axes, kg·m².
     pub inertia: Matrix3<f32>,
+    /// Coulomb friction coefficient.
     pub friction: f32,
-    /// Points that can touch the ground, in the link's frame, each with a radius.
+    /// Balls that can touch the ground: centre in the link's frame, and radius, metres.
     pub points: Vec<(Vector3<f32>, f32)>,
-    /// None of them is farther from the link's origin, metres.
+    /// Radius of the ball about the link's origin that holds all points, metres.
     pub reach: f32,
 }
 
-/// One velocity coordinate.
+/// One velocity coordinate (degree of freedom).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coordinate {
-    /// The node whose joint it turns, and its place on that node's path.
+    /// The node whose joint it belongs to.
     pub node: usize,
+    /// Its position on that node's path: the number of coordinates above it.
     pub depth: usize,
-    /// Where its row of a matrix begins.
+    /// Where its row of a [`super::matrix::PathMatrix`] begins.
     pub row: usize,
+    /// The drive that acts on it.
     pub gains: Gains,
 }
 
-/// Zero where nothing drives a coordinate.
+/// Gains of the drive of one coordinate; zeros where nothing drives it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gains {
+    /// N·m/rad.
     pub kp: f32,
+    /// N·m·s/rad.
     pub kd: f32,
+    /// Largest torque, N·m.
     pub limit: f32,
 }
 
-/// The nodes, parents before children.
+/// The nodes of a character, parents before children, and their coordinates in the same order.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     pub nodes: Vec<Node>,
     pub coordinates: Vec<Coordinate>,
-    /// `[nodes, nodes]`: how many coordinates move both.
+    /// `[nodes, nodes]`: how many coordinates move both of two nodes.
     shared: Vec<usize>,
 }
 
@@ -107,17 +118,18 @@ impl Tree {
         self.nodes.push(node(link, first, path));
     }
 
-    /// The path of a coordinate's node, which begins with its own.
+    /// The path of a coordinate's node. The coordinate's own path is the beginning of it, up to its depth.
     #[inline(always)]
     pub fn path(&self, coordinate: &Coordinate) -> &[usize] {
         &self.nodes[coordinate.node].path
     }
 
-    /// How many coordinates move both nodes: the first ones of either's path.
+    /// How many coordinates move both nodes. They are the first ones of either's path.
     pub fn shared(&self, a: usize, b: usize) -> usize {
         self.shared[a * self.nodes.len() + b]
     }
 
+    /// Number of points of all nodes that can touch the ground.
     pub fn points(&self) -> usize {
         self.nodes.iter().map(|node| node.points.len()).sum()
     }
@@ -160,10 +172,10 @@ fn joint(joint: &LinkJoint) -> Joint {
     }
 }
 
-/// Of each coordinate of a joint.
+/// Gains of each coordinate of a joint.
 fn gains(joint: &LinkJoint) -> Vec<Gains> {
     let of = |drive: &Drive| {
-        // What may give no force drives nothing.
+        // A drive that may give no torque is no drive.
         if drive.force_limit <= 0.0 {
             return Gains::default();
         }

@@ -1,4 +1,4 @@
-//! rapier speaks glam, mimic nalgebra: the one place where they meet.
+//! Conversions between nalgebra, which this library uses, and glam, which rapier uses.
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use rapier3d::math::{Mat3, Pose, Rotation, Vector};

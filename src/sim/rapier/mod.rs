@@ -1,10 +1,9 @@
-//! The only room that knows rapier.
+//! The rapier engine. Nothing outside this folder uses rapier.
 //!
-//! Bodies are joined by rapier's impulse joints (maximal coordinates): on the characters that mimic is made for
-//! they cost a tenth of its multibodies, and a spherical multibody joint cannot be driven by position. What needs
-//! care is handled here and nowhere else:
-//! the drive frame of ball joints ([`Rapier::set_targets`]), resets without a memory ([`Rapier::reset`]), sleeping,
-//! damping and speed caps (off), and quarantined bodies ([`Diverged`]).
+//! Bodies are connected by rapier's impulse joints (maximal coordinates). For characters of this size they cost a tenth of
+//! rapier's multibodies, and a spherical multibody joint cannot be driven by position. These are the parts that need care:
+//! drives of ball joints ([`Rapier::set_targets`]), resets that forget the past ([`Rapier::reset`]), sleep, damping and speed
+//! limits (all off), and bodies that rapier quarantines because they are no longer finite ([`Diverged`]).
 
 mod build;
 mod convert;
@@ -14,7 +13,7 @@ use super::error::Diverged;
 use super::settings::Settings;
 use super::state::{LinkState, Target};
 use crate::skeleton::GRAVITY;
-use build::{Built, Scene};
+use build::{Built, PhysicsState};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
 
@@ -23,25 +22,29 @@ pub(super) struct Rapier {
     settings: Settings,
     parameters: IntegrationParameters,
     pipeline: PhysicsPipeline,
-    pristine: Scene,
-    scene: Scene,
+    /// As built.
+    initial: PhysicsState,
+    state: PhysicsState,
     multibodies: MultibodyJointSet,
     soft_bodies: SoftBodySet,
     ccd: CCDSolver,
+    /// `[links]`.
     bodies: Vec<RigidBodyHandle>,
+    /// `[links]`: the joint to the parent; `None` for the root.
     joints: Vec<Option<ImpulseJointHandle>>,
-    /// Per link: rotation of the joint's first frame at rest, in the parent's frame, and the joint's own axes.
+    /// `[links]`: rotations parent from link at rest, and link from joint frame.
     frames: Vec<(UnitQuaternion<f32>, UnitQuaternion<f32>)>,
     ground: ColliderHandle,
+    /// `[links]`: centres of mass in the links' frames, metres.
     coms: Vec<Vector3<f32>>,
-    /// Per link, as built: mass and inertia about the centre of mass.
+    /// `[links]`, as built: mass (kg), and inertia about the centre of mass (kg·m²).
     masses: Vec<(f32, Matrix3<f32>)>,
 }
 
 impl Rapier {
     pub fn new(character: &Character, settings: Settings) -> Self {
         let Built {
-            scene,
+            state,
             bodies,
             joints,
             ground,
@@ -50,8 +53,8 @@ impl Rapier {
             settings,
             parameters: build::parameters(&settings),
             pipeline: PhysicsPipeline::new(),
-            pristine: scene.clone(),
-            scene,
+            initial: state.clone(),
+            state,
             multibodies: MultibodyJointSet::new(),
             soft_bodies: SoftBodySet::new(),
             ccd: CCDSolver::new(),
@@ -75,15 +78,15 @@ impl Rapier {
         }
     }
 
-    /// Puts every link where `states` says, with nothing left of the past.
+    /// Puts every link where `states` says, and forgets the past.
     ///
-    /// rapier starts a step's contacts from the impulses of the step before, also when the bodies were teleported
-    /// in between, and keeps islands, contact pairs and their order. So a reset works on a copy of the world as it
-    /// was built, and gives the same bits as a new one.
+    /// rapier keeps islands, contact pairs and their order, and impulses of the last step, also when bodies were teleported
+    /// in between. So a reset starts from a copy of the world as it was built, and gives the same bits as a new world.
     pub fn reset(&mut self, states: &[LinkState]) {
-        self.scene.clone_from(&self.pristine);
+        self.state.clone_from(&self.initial);
         for (i, state) in states.iter().enumerate() {
-            let body = &mut self.scene.bodies[self.bodies[i]];
+            let body = &mut self.state.bodies[self.bodies[i]];
+            // rapier's linear velocity is that of the centre of mass, ours that of the frame's origin.
             let arm = state.pose.rotation * self.coms[i];
             body.set_position(convert::pose(&state.pose), false);
             body.set_linvel(
@@ -94,7 +97,7 @@ impl Rapier {
         }
     }
 
-    /// Until the next reset all masses and inertias are `mass` times what they are, and friction `friction` times.
+    /// Until the next reset, multiplies all masses and inertias by `mass` and all friction coefficients by `friction`.
     pub fn vary(&mut self, mass: f32, friction: f32) {
         for ((handle, (own, inertia)), com) in self.bodies.iter().zip(&self.masses).zip(&self.coms)
         {
@@ -103,16 +106,17 @@ impl Rapier {
                 own * mass,
                 convert::matrix(&(inertia * mass)),
             );
-            self.scene.bodies[*handle].set_additional_mass_properties(scaled, false);
+            self.state.bodies[*handle].set_additional_mass_properties(scaled, false);
         }
-        for (_, collider) in self.scene.colliders.iter_mut() {
+        for (_, collider) in self.state.colliders.iter_mut() {
             collider.set_friction(collider.friction() * friction);
         }
     }
 
-    /// Gives a link an impulse at its centre of mass, world axes, N·s. Its mass is that of the last step.
+    /// Gives a link an impulse at its centre of mass, world axes, N·s. The mass by which it divides is that of the last step:
+    /// rapier updates mass properties when it steps.
     pub fn push(&mut self, link: usize, impulse: Vector3<f32>) {
-        let body = &mut self.scene.bodies[self.bodies[link]];
+        let body = &mut self.state.bodies[self.bodies[link]];
         let mass = body.mass();
         if mass > 0.0 {
             let velocity = body.linvel() + convert::vector(impulse / mass);
@@ -120,17 +124,17 @@ impl Rapier {
         }
     }
 
-    /// Sets what the drives hold until the next call; one target per link.
+    /// Sets the targets that the drives hold until the next call, one per link.
     ///
-    /// rapier's motors measure a ball joint's error axis by axis as 2·asin of the quaternion's imaginary part, which
-    /// is wrong far from zero. So the joint's first frame is turned to the target, and the motors hold zero: there
-    /// the measure is exact to third order, and every ball is a true spherical PD drive.
+    /// rapier's motors measure the error of a ball joint axis by axis as 2·asin of the quaternion's imaginary part, which is
+    /// wrong far from zero. So the joint's first frame is turned to the target and the motors hold zero: there the measure is
+    /// exact to third order, and every ball is a spherical PD drive.
     pub fn set_targets(&mut self, targets: &[Target]) {
         for (i, target) in targets.iter().enumerate() {
             let Some(handle) = self.joints[i] else {
                 continue;
             };
-            let Some(joint) = self.scene.joints.get_mut(handle, false) else {
+            let Some(joint) = self.state.joints.get_mut(handle, false) else {
                 continue;
             };
             let (rest, axes) = self.frames[i];
@@ -155,12 +159,12 @@ impl Rapier {
             self.pipeline.step(
                 Vector::new(0.0, 0.0, -GRAVITY as f32),
                 &self.parameters,
-                &mut self.scene.islands,
-                &mut self.scene.broad_phase,
-                &mut self.scene.narrow_phase,
-                &mut self.scene.bodies,
-                &mut self.scene.colliders,
-                &mut self.scene.joints,
+                &mut self.state.islands,
+                &mut self.state.broad_phase,
+                &mut self.state.narrow_phase,
+                &mut self.state.bodies,
+                &mut self.state.colliders,
+                &mut self.state.joints,
                 &mut self.multibodies,
                 &mut self.soft_bodies,
                 &mut self.ccd,
@@ -174,6 +178,7 @@ impl Rapier {
         Ok(())
     }
 
+    /// Writes the state of every link, and whether it presses on the ground.
     pub fn read(&self, states: &mut [LinkState], contacts: &mut [bool]) {
         self.read_states(states);
         self.read_contacts(contacts);
@@ -181,7 +186,7 @@ impl Rapier {
 
     fn read_states(&self, states: &mut [LinkState]) {
         for ((state, handle), com) in states.iter_mut().zip(&self.bodies).zip(&self.coms) {
-            let body = &self.scene.bodies[*handle];
+            let body = &self.state.bodies[*handle];
             state.pose = convert::from_pose(body.position());
             state.angular = convert::from_vector(body.angvel());
             let arm = state.pose.rotation * com;
@@ -191,14 +196,14 @@ impl Rapier {
 
     fn read_contacts(&self, contacts: &mut [bool]) {
         contacts.fill(false);
-        for pair in self.scene.narrow_phase.contact_pairs_with(self.ground) {
+        for pair in self.state.narrow_phase.contact_pairs_with(self.ground) {
             let other = if pair.collider1 == self.ground {
                 pair.collider2
             } else {
                 pair.collider1
             };
             let pressed = pair.total_impulse_magnitude() > 0.0;
-            if pressed && let Some(collider) = self.scene.colliders.get(other) {
+            if pressed && let Some(collider) = self.state.colliders.get(other) {
                 contacts[collider.user_data as usize] = true;
             }
         }
