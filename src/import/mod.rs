@@ -1,6 +1,6 @@
-//! Bytes of an animation file become a [`Clip`](crate::clip::Clip).
+//! Bytes of an animation file become a [`Clip`].
 //!
-//! A reader per format turns bytes into a [`scene::Scene`]. Everything after that is common to all formats: the choice of
+//! A reader per format turns bytes into a scene: its nodes, its takes, and where every node is at any time. Everything after that is common to all formats: the choice of
 //! the take and of the joints, canonical axes and metres, rigid transforms, sampling, and the detection of loops.
 //!
 //! Positions are facts and everything else in a file is a claim: where rest pose, unit, up axis or heading disagree with
