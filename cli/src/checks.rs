@@ -1,10 +1,10 @@
-//! A motion's checks as lines of text.
+//! The checks of a motion as lines of text.
 
 use mimic::clip::Severity;
 use mimic::motion::Check;
 use std::fmt::Write;
 
-/// A line for every check, and what to do about those that aren't passed.
+/// A line for every check, then what to do about those that failed.
 pub fn table(checks: &[Check]) -> String {
     let mut text = String::new();
     for check in checks {
@@ -20,7 +20,7 @@ pub fn table(checks: &[Check]) -> String {
     text + &advice(checks)
 }
 
-/// What to do about the checks that aren't passed.
+/// What to do about the checks that failed.
 pub fn advice(checks: &[Check]) -> String {
     let mut text = String::new();
     for check in checks.iter().filter(|check| !check.passed) {

@@ -1,9 +1,10 @@
-//! What is said of a clip that was written.
+//! What `import` and `edit` report of a clip that they wrote.
 
 use mimic::clip::{Clip, LoopMode, Problem};
 use serde::Serialize;
 use std::path::Path;
 
+/// The clip's file and what is in it.
 #[derive(Serialize)]
 pub struct ClipReport {
     clip: String,
@@ -17,6 +18,7 @@ pub struct ClipReport {
 }
 
 impl ClipReport {
+    /// Of the clip that was written to `path`.
     pub fn new(path: &Path, clip: Clip) -> Self {
         Self {
             clip: path.display().to_string(),
@@ -29,15 +31,16 @@ impl ClipReport {
         }
     }
 
+    /// What import or edit found wrong with it.
     pub fn problems(&self) -> &[Problem] {
         &self.problems
     }
 
-    /// The same for people.
+    /// The report in a line of text.
     pub fn line(&self) -> String {
         let loops = match self.loop_mode {
             LoopMode::Wrap => "loops",
-            LoopMode::Clamp => "ends",
+            LoopMode::Clamp => "plays once",
         };
         let Self {
             clip,

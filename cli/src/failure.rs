@@ -1,149 +1,202 @@
 //! What can end a command early, and the exit code it ends with.
+//!
+//! The library's errors come with their parts ([`Explain`]): which file, where in it, what is wrong and what to do. All that
+//! is added here is the name of the flag to change. Exit code 2 is for what the user can mend, 1 for work that failed.
 
-use mimic::clip;
-use mimic::explain::{Explain, Fault};
-use mimic::motion::MotionError;
+use mimic::explain::{Explain, Explanation, Fault, Parameter, Remedy};
+use serde_json::{Value, json};
+use std::error::Error;
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
-use std::process::ExitCode;
 
-/// Wrong usage or input: the person who typed the command can mend it.
-#[derive(Debug)]
-pub struct UserError(String);
+/// The flag that sets a parameter of the library.
+fn flag(parameter: Parameter) -> Option<&'static str> {
+    Some(match parameter {
+        Parameter::Take => "--take",
+        Parameter::FrameRate => "--fps",
+        Parameter::Trim => "--trim",
+        Parameter::Unit => "--unit",
+        Parameter::UpAxis => "--up",
+        Parameter::LoopMode => "--loop",
+        Parameter::JointMap => "--map",
+        Parameter::Skeleton => "--skeleton",
+        Parameter::Speed => "--speed",
+        Parameter::Output => "--out",
+        _ => return None,
+    })
+}
 
-/// Everything was right, and the work still failed.
-#[derive(Debug)]
-pub struct WorkError(String);
-
-/// What to do about a file that the system doesn't give.
-const CHECK: &str = "check the path and its permissions";
-/// What to do about a file that the system doesn't take.
-const CHECK_ROOM: &str = "check the path, its permissions and the room there";
-
+/// Why a command ended early.
 #[derive(Debug)]
 pub enum Failure {
-    User(UserError),
-    Work(WorkError),
-    /// The reader of our output went away, which is its right.
+    /// It failed, and nobody has been told yet.
+    Failed(Box<Explanation>),
+    /// It failed in part: its result has been printed, and holds the error where it is JSON.
+    Partly(Box<Explanation>),
+    /// The reader of our output went away, as `head` does: no failure.
     ClosedPipe,
 }
 
+/// What a command, or a step of it, comes to.
 pub type Outcome<T = ()> = Result<T, Failure>;
 
 impl Failure {
-    pub fn user(message: impl Display) -> Self {
-        Self::User(UserError(one_line(message)))
+    fn new(parts: Explanation) -> Self {
+        Self::Failed(Box::new(parts))
     }
 
-    pub fn work(message: impl Display) -> Self {
-        Self::Work(WorkError(one_line(message)))
+    /// Wrong usage or input: whoever typed the command can mend it.
+    pub fn user(cause: impl Display) -> Self {
+        Self::new(Explanation::input(cause.to_string()))
     }
 
-    /// Failed work, with what to do about it.
-    pub fn with_remedy(self, remedy: impl Display) -> Self {
+    /// Work that failed although the input was right.
+    pub fn work(cause: impl Display) -> Self {
+        Self::new(Explanation::work(cause.to_string()))
+    }
+
+    /// Wrong input, in one file.
+    pub fn input(file: &Path, cause: impl Display) -> Self {
+        Self::new(Explanation::input(cause.to_string()).file(file))
+    }
+
+    /// An error of the library about what came from `file`, unless it names another itself.
+    pub fn in_file(file: &Path, error: impl Explain) -> Self {
+        let mut parts = error.explain();
+        parts.file.get_or_insert_with(|| file.to_owned());
+        Self::new(parts)
+    }
+
+    /// The same for an error that does not tell its parts yet: its whole message is the cause, but for the name of its file.
+    pub fn library(file: &Path, error: impl Display) -> Self {
+        let text = error.to_string();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let names = [file.to_string_lossy(), name];
+        let mut starts = names.iter().flat_map(|n| [format!("`{n}`"), n.to_string()]);
+        let cause = starts
+            .find_map(|start| text.strip_prefix(&start))
+            .unwrap_or(&text);
+        Self::input(file, cause.trim_start_matches(':').trim_start())
+    }
+
+    /// A file that may be there, but cannot be read.
+    pub fn unreadable(file: &Path, cause: &io::Error) -> Self {
+        Self::input(file, format!("cannot be read ({cause})"))
+            .with_remedy("check the path and its permissions")
+    }
+
+    /// A file or folder that cannot be written.
+    pub fn write(file: &Path, cause: impl Into<Box<dyn Error>>) -> Self {
+        let cause = cause.into();
+        let mut reason: &dyn Error = &*cause;
+        // The innermost reason is that of the system. Those around it may name the temporary file beside this one.
+        while let Some(source) = reason.source() {
+            reason = source;
+        }
+        Self::new(Explanation::work(format!("cannot be written ({reason})")).file(file))
+            .with_remedy("check the path, its permissions and the free space on the disk")
+    }
+
+    /// Output that cannot be printed.
+    pub fn print(cause: &io::Error) -> Self {
+        match cause.kind() {
+            io::ErrorKind::BrokenPipe => Self::ClosedPipe,
+            _ => Self::work(format!("cannot print the result: {cause}")),
+        }
+    }
+
+    /// Says where in the file.
+    #[must_use]
+    pub fn with_place(mut self, place: impl Display) -> Self {
+        if let Self::Failed(parts) | Self::Partly(parts) = &mut self {
+            parts.place = Some(place.to_string());
+        }
+        self
+    }
+
+    /// Says what to do about it; `advice` begins with a verb.
+    #[must_use]
+    pub fn with_remedy(mut self, advice: impl Display) -> Self {
+        if let Self::Failed(parts) | Self::Partly(parts) = &mut self {
+            parts.remedy = Some(Remedy {
+                advice: advice.to_string(),
+                parameter: None,
+            });
+        }
+        self
+    }
+
+    /// The failure of a command whose result has been printed.
+    #[must_use]
+    pub fn partly(self) -> Self {
         match self {
-            Self::Work(WorkError(message)) => Self::work(format!("{message}; {remedy}")),
+            Self::Failed(parts) => Self::Partly(parts),
             other => other,
         }
     }
 
-    /// An input error about one file. The file is named once, also where the cause names it already.
-    pub fn input(path: &Path, cause: impl Display) -> Self {
-        let cause = without_name(path, &cause.to_string());
-        Self::user(format!("`{}`: {cause}", path.display()))
-    }
-
-    /// A file that is there, perhaps, but can't be read.
-    pub fn unreadable(path: &Path, cause: &io::Error) -> Self {
-        Self::input(path, format!("cannot be read ({cause}); {CHECK}"))
-    }
-
-    /// An error of the library, which says itself whose fault it is.
-    pub fn explained(error: &dyn Explain) -> Self {
-        let told = error.explain();
-        match told.fault {
-            Fault::Input => Self::user(told),
-            Fault::Work => Self::work(told),
+    /// The exit code of the command.
+    pub fn code(&self) -> u8 {
+        match self.parts().map(|parts| parts.fault) {
+            None => 0,
+            Some(Fault::Work) => 1,
+            Some(Fault::Input) => 2,
         }
     }
 
-    /// An error about the clip file `path`.
-    pub fn clip(path: &Path, cause: clip::Error) -> Self {
-        match cause {
-            clip::Error::File(error) => Self::explained(&error),
-            cause => Self::input(path, cause),
-        }
+    /// The message in one line, with the flag to change; `None` where there is nothing to say.
+    pub fn message(&self) -> Option<String> {
+        let mut parts = self.parts()?.clone();
+        parts.remedy = remedy(&parts).map(|advice| Remedy {
+            advice,
+            parameter: None,
+        });
+        Some(one_line(&parts.to_string()))
     }
 
-    /// An error about the motion file `path`.
-    pub fn motion(path: &Path, cause: MotionError) -> Self {
-        match cause {
-            MotionError::File(error) => Self::explained(&error),
-            cause => Self::input(path, cause),
-        }
+    /// The parts of the message for scripts.
+    pub fn json(&self) -> Value {
+        let Some(parts) = self.parts() else {
+            return Value::Null;
+        };
+        json!({
+            "message": self.message(),
+            "file": parts.file,
+            "place": parts.place.as_deref().map(one_line),
+            "remedy": remedy(parts).as_deref().map(one_line),
+            "exit": self.code(),
+        })
     }
 
-    /// A file that cannot be written. The file is named once here too.
-    pub fn write(path: &Path, cause: impl Display) -> Self {
-        let cause = without_name(path, &cause.to_string());
-        let cause = cause.trim_end_matches(CHECK).trim_end_matches("; ");
-        // The temporary file beside it is nobody's concern.
-        let cause = cause.split(" at path ").next().unwrap_or(cause);
-        Self::work(format!(
-            "cannot write `{}`: {cause}; {CHECK_ROOM}",
-            path.display()
-        ))
-    }
-
-    pub fn exit_code(&self) -> ExitCode {
+    fn parts(&self) -> Option<&Explanation> {
         match self {
-            Self::ClosedPipe => ExitCode::SUCCESS,
-            Self::Work(_) => ExitCode::from(1),
-            Self::User(_) => ExitCode::from(2),
-        }
-    }
-
-    pub fn message(&self) -> Option<&str> {
-        match self {
-            Self::User(UserError(message)) | Self::Work(WorkError(message)) => Some(message),
+            Self::Failed(parts) | Self::Partly(parts) => Some(parts),
             Self::ClosedPipe => None,
         }
     }
 }
 
-/// Failure to print.
-impl From<io::Error> for Failure {
-    fn from(error: io::Error) -> Self {
-        match error.kind() {
-            io::ErrorKind::BrokenPipe => Self::ClosedPipe,
-            _ => Self::work(format!("cannot print: {error}")),
-        }
+impl<E: Explain> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::new(error.explain())
     }
 }
 
-/// What a cause says after the name of its file: `x: …`, `` `x`: … ``, `` `x` is … ``, `` cannot write `x`: … ``.
-fn without_name(path: &Path, cause: &str) -> String {
-    let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let bare = cause.strip_prefix("cannot write ").unwrap_or(cause);
-    let rest = [path.to_string_lossy(), file].into_iter().find_map(|name| {
-        let quoted = format!("`{name}`");
-        let rest = bare
-            .strip_prefix(&quoted)
-            .or_else(|| bare.strip_prefix(&*name))?;
-        rest.strip_prefix(':').or(rest.strip_prefix(' '))
-    });
-    rest.map_or(cause, str::trim_start).to_owned()
+/// The advice with its flag: "choose another take (`--take`)".
+fn remedy(parts: &Explanation) -> Option<String> {
+    let Remedy { advice, parameter } = parts.remedy.as_ref()?;
+    Some(match parameter.and_then(flag) {
+        Some(flag) => format!("{advice} (`{flag}`)"),
+        None => advice.clone(),
+    })
 }
 
-fn one_line(message: impl Display) -> String {
-    let text = message.to_string();
+/// Names and paths come from files: whatever they hold, a message stays on one line and harmless to a terminal.
+fn one_line(text: &str) -> String {
     let words: Vec<_> = text.split_whitespace().collect();
-    words
-        .join(" ")
-        .chars()
-        .filter(|c| !c.is_control())
-        .collect()
+    let line = words.join(" ");
+    line.chars().filter(|c| !c.is_control()).collect()
 }
 
 #[cfg(test)]
@@ -151,43 +204,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_stays_on_one_line_and_names_its_file_once() {
-        let path = Path::new("a/kick.fbx");
-        let plain = Failure::input(path, "truncated\n  at byte 3");
-        assert_eq!(plain.message(), Some("`a/kick.fbx`: truncated at byte 3"));
-        for name in ["a/kick.fbx:", "kick.fbx:", "`a/kick.fbx`:", "`kick.fbx`"] {
-            let named = Failure::input(path, format!("{name} an empty file"));
-            assert_eq!(named.message(), Some("`a/kick.fbx`: an empty file"));
-        }
-        let other = Failure::input(path, "kick.fbx.bin: an empty file");
+    fn a_message_stays_on_one_line() {
+        let failure = Failure::input(Path::new("a/kick.fbx"), "truncated\n  at byte 3\x1b[2J");
         assert_eq!(
-            other.message(),
-            Some("`a/kick.fbx`: kick.fbx.bin: an empty file")
+            failure.message().as_deref(),
+            Some("`a/kick.fbx`: truncated at byte 3[2J")
         );
     }
 
     #[test]
-    fn what_cannot_be_written_is_named_once_with_a_remedy() {
-        let path = Path::new("a/kick.clip");
-        for cause in [
-            "no room",
-            "a/kick.clip: no room; check the path and its permissions",
-            "cannot write `a/kick.clip`: no room",
-            "no room at path \"a/.mimic-123\"",
-        ] {
-            assert_eq!(
-                Failure::write(path, cause).message(),
-                Some(
-                    "cannot write `a/kick.clip`: no room; check the path, its permissions and the room there"
-                )
-            );
-        }
+    fn the_flag_to_change_stands_in_the_remedy() {
+        let parts = Explanation::input("it has no frames")
+            .file("kick.fbx")
+            .place("take `Kick`")
+            .remedy_by(Parameter::Take, "choose another take");
+        let failure = Failure::new(parts);
+        let line = "`kick.fbx`: take `Kick`: it has no frames; choose another take (`--take`)";
+        assert_eq!(failure.message().as_deref(), Some(line));
+        let expected = json!({
+            "message": line,
+            "file": "kick.fbx",
+            "place": "take `Kick`",
+            "remedy": "choose another take (`--take`)",
+            "exit": 2,
+        });
+        assert_eq!(failure.json(), expected);
     }
 
     #[test]
-    fn a_closed_pipe_is_success() {
-        let failure = Failure::from(io::Error::from(io::ErrorKind::BrokenPipe));
-        assert!(failure.message().is_none());
-        assert_eq!(failure.exit_code(), ExitCode::SUCCESS);
+    fn the_fault_decides_the_exit_code() {
+        assert_eq!(Failure::user("wrong").code(), 2);
+        assert_eq!(Failure::work("broken").partly().code(), 1);
+        let closed = Failure::print(&io::ErrorKind::BrokenPipe.into());
+        assert_eq!((closed.code(), closed.message()), (0, None));
     }
 }

@@ -1,38 +1,38 @@
-//! Finding inputs: by path, by name in the library folder or among the runs, or the most recent one.
+//! Finding inputs: by path, by name in the library folder or in `runs/`, or the newest one.
 
 use crate::failure::{Failure, Outcome};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Files that lead to a motion, the finished first.
+/// Extensions of all files that a motion can be made of, in the order in which a name is looked for.
 pub const ANIMATIONS: [&str; 11] = [
     "motion", "clip", "fbx", "glb", "gltf", "vrm", "vrma", "bvh", "amc", "txt", "json",
 ];
-/// The same without finished motions.
+/// The same without motions.
 pub const CLIPS: [&str; 10] = [
     "clip", "fbx", "glb", "gltf", "vrm", "vrma", "bvh", "amc", "txt", "json",
 ];
-/// What other tools write.
+/// The same without our own formats: what other tools write.
 pub const SOURCES: [&str; 9] = [
     "fbx", "glb", "gltf", "vrm", "vrma", "bvh", "amc", "txt", "json",
 ];
 
-/// Folder of training runs.
+/// The folder of training runs.
 pub const RUNS: &str = "runs";
-/// Every run has one, from its first moment.
+/// The file that makes a folder a run: it is written first.
 pub const RUN_CONFIG: &str = "config.json";
 
 /// How many names an error message lists.
 const NAMES_SHOWN: usize = 8;
 
-/// The file that `wanted` means: a path, or a name in the library with one of `extensions`, tried in order.
+/// The file that `wanted` means: a path, or a name in the library with one of `extensions`, the first before the others.
 pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathBuf> {
     if wanted.is_file() {
         return Ok(wanted.to_path_buf());
     }
     if wanted.is_dir() && !is_name(wanted) {
-        return Err(Failure::input(wanted, "a folder, give a file in it"));
+        return Err(Failure::input(wanted, "this is a folder").with_remedy("name a file in it"));
     }
     if is_name(wanted) {
         let whole = Some(library.join(wanted)).filter(|path| path.is_file());
@@ -43,7 +43,20 @@ pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathB
     Err(absent(wanted, library, extensions))
 }
 
-/// The file of the library that is called `name` but for its extension, which is in upper case on some systems.
+/// The same for commands that work on clips, and on what clips are made of.
+pub fn clip(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathBuf> {
+    let found = file(wanted, library, extensions)?;
+    if has_extension(&found, "motion") {
+        return Err(
+            Failure::input(&found, "this is a motion, not a clip").with_remedy(
+                "give the clip that it was made from, or show the motion with `mimic tracks`",
+            ),
+        );
+    }
+    Ok(found)
+}
+
+/// The file of the library called `name` without its extension, which some systems write in capitals.
 fn named(name: &Path, library: &Path, extensions: &[&str]) -> Option<PathBuf> {
     let called = |path: &PathBuf| path.is_file() && path.file_stem() == name.file_name();
     let mut files: Vec<_> = entries(library).filter(called).collect();
@@ -52,8 +65,8 @@ fn named(name: &Path, library: &Path, extensions: &[&str]) -> Option<PathBuf> {
     wanted.find_map(|e| files.iter().find(|path| has_extension(path, e)).cloned())
 }
 
-/// The file that `wanted` means; left out, the newest `.newest` file here or in the library: one of our own
-/// kinds, never just any text that lies about.
+/// The file that `wanted` means. Left out, the newest file with the extension `newest` in this folder or in the library;
+/// that is one of our own formats, so that no stray text file is taken for a clip.
 pub fn file_or_newest(
     wanted: Option<&Path>,
     library: &Path,
@@ -65,20 +78,20 @@ pub fn file_or_newest(
     }
     newest_file(&[Path::new("."), library], newest).ok_or_else(|| {
         let library = library.display();
-        Failure::user(format!(
-            "no file given, and no .{newest} here or in the library `{library}`"
-        ))
+        let cause = format!(
+            "no file was given, and there is no `.{newest}` file in this folder or in the library `{library}`"
+        );
+        Failure::user(cause).with_remedy("name a file")
     })
 }
 
-/// The folder of the run that `wanted` means: a path, or a name in `runs/`; left out, the newest one.
+/// The folder of the run that `wanted` means: a path, or a name in `runs/`. Left out, the newest run.
 pub fn run(wanted: Option<&Path>) -> Outcome<PathBuf> {
     match wanted {
         Some(wanted) => existing_run(wanted).ok_or_else(|| absent_run(wanted)),
         None => newest_run().ok_or_else(|| {
-            Failure::user(format!(
-                "no run in `{RUNS}`, make one with `mimic train CLIP`"
-            ))
+            Failure::user(format!("there is no run in `{RUNS}/`"))
+                .with_remedy("make one with `mimic train CLIP`")
         }),
     }
 }
@@ -90,16 +103,18 @@ pub fn existing_run(wanted: &Path) -> Option<PathBuf> {
     places.into_iter().find(|path| is_run(path))
 }
 
+/// Whether a folder holds a run.
 pub fn is_run(path: &Path) -> bool {
     path.join(RUN_CONFIG).is_file()
 }
 
+/// The run in `runs/` that learned last.
 pub fn newest_run() -> Option<PathBuf> {
     let folders = entries(Path::new(RUNS)).filter(|path| is_run(path));
     folders.max_by_key(|path| (run_time(path), path.clone()))
 }
 
-/// When a run last learned something.
+/// When a run learned last; before its first checkpoint, when it was made.
 fn run_time(run: &Path) -> Option<SystemTime> {
     let files = ["checkpoint.safetensors", "metrics.jsonl", RUN_CONFIG];
     files.iter().find_map(|file| modified(&run.join(file)))
@@ -117,6 +132,7 @@ fn newest_file(folders: &[&Path], extension: &str) -> Option<PathBuf> {
         })
 }
 
+/// Whether a file has this extension, in whatever case.
 pub fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension()
         .is_some_and(|e| e.eq_ignore_ascii_case(extension))
@@ -131,42 +147,42 @@ fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> {
     entries.filter_map(|entry| Some(entry.ok()?.path()))
 }
 
-/// A single word rather than a way through folders.
+/// Whether a path is a single name, which may stand for a file of the library or a run.
 fn is_name(path: &Path) -> bool {
     path.components().count() == 1 && path.file_name().is_some()
 }
 
 fn absent(wanted: &Path, library: &Path, extensions: &[&str]) -> Failure {
     if !is_name(wanted) {
-        return Failure::input(wanted, "no such file");
+        return Failure::input(wanted, "no such file").with_remedy("check the path");
     }
     let fits = |path: &PathBuf| extensions.iter().any(|e| has_extension(path, e));
     let known = listing(entries(library).filter(fits));
-    let library = library.display();
-    let hint = match known {
-        Some(known) => {
-            format!("and none of that name in the library `{library}`, which has {known}")
-        }
-        None => format!(
-            "and nothing in the library `{library}`; give a path, or a library with `--library DIR`"
-        ),
+    let cause = format!(
+        "no such file here, nor one of that name in the library `{}`",
+        library.display()
+    );
+    let remedy = match known {
+        Some(known) => format!("give a path, or a name from the library: {known}"),
+        None => "give a path, or the folder of your clips with `--library DIR`".into(),
     };
-    Failure::input(wanted, format!("no such file, {hint}"))
+    Failure::input(wanted, cause).with_remedy(remedy)
 }
 
 fn absent_run(wanted: &Path) -> Failure {
     let known = listing(entries(Path::new(RUNS)).filter(|path| is_run(path)));
-    let hint = match known {
-        Some(known) => format!("there are {known}"),
-        None => "make one with `mimic train CLIP`".into(),
+    let remedy = match known {
+        Some(known) => format!("choose one of the runs: {known}"),
+        None => "make a run with `mimic train CLIP`".into(),
     };
-    let what = match wanted.is_file() {
-        true => "is a file, and a run is a folder".to_owned(),
-        false => format!("no run there or in `{RUNS}`"),
+    let cause = match wanted.is_file() {
+        true => "this is a file, and a run is a folder".to_owned(),
+        false => format!("there is no run here or in `{RUNS}/`"),
     };
-    Failure::input(wanted, format!("{what}; {hint}"))
+    Failure::input(wanted, cause).with_remedy(remedy)
 }
 
+/// The first few names of files or folders, without extensions, in a sentence.
 fn listing(paths: impl Iterator<Item = PathBuf>) -> Option<String> {
     let stem = |path: PathBuf| Some(path.file_stem()?.to_string_lossy().into_owned());
     let mut names: Vec<String> = paths.filter_map(stem).collect();

@@ -2,6 +2,7 @@
 
 mod args;
 mod checks;
+mod cli;
 mod clip_report;
 mod failure;
 mod locate;
@@ -14,12 +15,17 @@ mod runs;
 mod verbs;
 mod viewer;
 
-use clap::Parser;
+use clap::CommandFactory;
+use cli::Cli;
+use printer::Printer;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = args::Cli::parse();
-    let printer = printer::Printer::new(&cli.talk);
-    let outcome = verbs::run(cli.verb, &cli.library, &printer);
+    let cli = match cli::parse() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
+    let printer = Printer::new(&cli.talk);
+    let outcome = verbs::run(cli.verb, Cli::command(), &cli.library, &printer);
     printer.finish(outcome)
 }

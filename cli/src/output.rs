@@ -1,4 +1,4 @@
-//! Where results are written.
+//! Where results are written, and what they never replace.
 
 use crate::failure::{Failure, Outcome};
 use crate::locate;
@@ -9,9 +9,9 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Outcome {
     mimic::file::replace(path, bytes).map_err(|e| Failure::write(path, e))
 }
 
-/// Path of a result: the file `--out` names, or `NAME.EXTENSION` in the folder it names, or in this folder.
+/// Path of a result: the file that `--out` names, or `NAME.EXTENSION` in the folder that it names, or in this folder.
 pub fn result_path(out: Option<&Path>, name: &str, extension: &str) -> PathBuf {
-    let file = format!("{}.{extension}", file_name(name));
+    let file = format!("{}.{extension}", safe_name(name));
     match out {
         Some(out) if names_folder(out) => out.join(file),
         Some(out) => out.to_path_buf(),
@@ -19,48 +19,46 @@ pub fn result_path(out: Option<&Path>, name: &str, extension: &str) -> PathBuf {
     }
 }
 
-/// Creates the folder of a result, and refuses to replace the input it comes from, or what is no file with its `extension`.
+/// Creates the folder of a result. Refuses to replace the input that the result comes from, and any file without the
+/// result's `extension`.
 pub fn make_room(path: &Path, input: &Path, extension: &str) -> Outcome {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
     }
-    // Only now: the way to the input may lead through the folder that wasn't there.
+    // Not earlier: the input's path may lead through the folder that was just made (`made/../kick.fbx`).
     spare_input(path, input)?;
     spare_others(path, extension)
 }
 
-/// Refuses to replace a file of another kind than the result's, a clip by its recording for one, and what is no file at all.
+/// Refuses to replace a file of another kind, such as a clip by its recording, and devices and the like.
 pub fn spare_others(path: &Path, extension: &str) -> Outcome {
     let replaceable = path.is_file() && locate::has_extension(path, extension);
-    // A folder isn't replaced: writing over it fails.
+    // A folder is left to the writing, which fails with the system's own reason.
     if replaceable || path.is_dir() || !path.exists() {
         return Ok(());
     }
-    Err(Failure::user(format!(
-        "`{}` is there already and is no `.{extension}` file, name another file to write",
-        path.display()
-    )))
+    let cause = format!("this exists already and is not a `.{extension}` file");
+    Err(Failure::input(path, cause).with_remedy("choose another file to write"))
 }
 
 /// Refuses to replace the input of a result.
 pub fn spare_input(path: &Path, input: &Path) -> Outcome {
     match (path.canonicalize(), input.canonicalize()) {
         (Ok(a), Ok(b)) if a == b => {
-            let path = path.display();
-            Err(Failure::user(format!(
-                "`{path}` is the input itself, name another file to write"
-            )))
+            let failure = Failure::input(path, "this is the input itself");
+            Err(failure.with_remedy("choose another file to write"))
         }
         _ => Ok(()),
     }
 }
 
-/// Whether `--out` means a folder: it is one, or ends like one.
+/// Whether `--out` means a folder: one that exists, or a path that ends in a slash.
 pub fn names_folder(out: &Path) -> bool {
     out.is_dir() || out.as_os_str().to_string_lossy().ends_with('/')
 }
 
-pub fn file_name(name: &str) -> String {
+/// A name from a file, such as that of a take, as a file name that every system takes.
+pub fn safe_name(name: &str) -> String {
     let clean = |c: char| {
         if c.is_alphanumeric() || "-_.".contains(c) {
             c
@@ -83,9 +81,9 @@ mod tests {
 
     #[test]
     fn names_become_file_names() {
-        assert_eq!(file_name("mixamo.com|Take 001"), "mixamo.com-Take-001");
-        assert_eq!(file_name("../../x"), "x");
-        assert_eq!(file_name("…/"), "clip");
+        assert_eq!(safe_name("mixamo.com|Take 001"), "mixamo.com-Take-001");
+        assert_eq!(safe_name("../../x"), "x");
+        assert_eq!(safe_name("…/"), "clip");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! From whatever file is given to a motion: any stage takes the file of an earlier one and does what is missing.
+//! From any file to a motion: every stage accepts the file of an earlier one and does what is missing.
 
 use crate::args::{ImportArgs, RetargetArgs};
 use crate::failure::{Failure, Outcome};
@@ -12,15 +12,15 @@ use mimic::retarget;
 use mimic::skeleton::Skeleton;
 use std::path::PathBuf;
 
-/// A motion and the skeleton that it moves.
+/// A motion, and the skeleton that it moves.
 pub struct Prepared {
     pub motion: Motion,
     pub skeleton: Skeleton,
-    /// How long retargeting took; `None` for a motion that was made before.
+    /// How long retargeting took; `None` for a motion that was read from a file.
     pub seconds: Option<f64>,
 }
 
-/// How a file becomes a motion.
+/// A file, and how to make a motion of it.
 pub struct Preparation {
     pub file: PathBuf,
     import: ImportArgs,
@@ -29,6 +29,7 @@ pub struct Preparation {
 }
 
 impl Preparation {
+    /// With the options of the command line.
     pub fn new(file: PathBuf, import: &ImportArgs, retarget: &RetargetArgs) -> Self {
         Self {
             file,
@@ -38,12 +39,12 @@ impl Preparation {
         }
     }
 
-    /// As in [`retarget::Options::to_perform`].
+    /// See [`retarget::Options::to_perform`].
     pub fn for_performance(self, to_perform: bool) -> Self {
         Self { to_perform, ..self }
     }
 
-    /// Name of what comes of it.
+    /// Name of the motion: that of the file, and of the take if one was asked for.
     pub fn name(&self) -> String {
         let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
         match self.import.take() {
@@ -52,6 +53,7 @@ impl Preparation {
         }
     }
 
+    /// Whether the file is a motion already.
     pub fn is_motion(&self) -> bool {
         locate::has_extension(&self.file, "motion")
     }
@@ -77,7 +79,7 @@ impl Preparation {
             to_perform: self.to_perform,
         };
         let done = retarget::retarget(&clip, &skeleton, &options)
-            .map_err(|e| Failure::input(&self.file, e))?;
+            .map_err(|e| Failure::library(&self.file, e))?;
         let new = |problem: &&Problem| !clip.problems.contains(problem);
         let found: Vec<_> = done.report.problems.iter().filter(new).cloned().collect();
         printer.problems(&found);
@@ -97,16 +99,15 @@ impl Preparation {
             ("--weight", !self.retarget.weight.is_empty()),
         ];
         if let Some((flag, _)) = flags.into_iter().find(|(_, given)| *given) {
-            return Err(Failure::input(
-                &self.file,
-                format!("is retargeted already, `{flag}` doesn't apply; give the clip"),
-            ));
+            let cause = format!("this is a motion, and `{flag}` applies to clips");
+            return Err(Failure::input(&self.file, cause)
+                .with_remedy("give the clip that the motion was made from"));
         }
-        let motion = Motion::load(&self.file).map_err(|e| Failure::motion(&self.file, e))?;
+        let motion = Motion::load(&self.file)?;
         let skeleton = self.skeleton_of(&motion)?;
         motion
             .check_skeleton(&skeleton)
-            .map_err(|e| Failure::motion(&self.file, e))?;
+            .map_err(|e| Failure::in_file(&self.file, e))?;
         printer.detail(format!("read `{}`", self.file.display()));
         Ok(Prepared {
             motion,
@@ -115,17 +116,17 @@ impl Preparation {
         })
     }
 
-    /// The skeleton a motion names, unless another file is given for it.
+    /// The skeleton that a motion names, unless `--skeleton` gives its file.
     fn skeleton_of(&self, motion: &Motion) -> Outcome<Skeleton> {
         if self.retarget.skeleton.is_some() {
             return self.retarget.skeleton();
         }
         Skeleton::load(&motion.skeleton_name).map_err(|_| {
             let name = &motion.skeleton_name;
-            Failure::input(
-                &self.file,
-                format!("was made for `{name}`, which isn't built in; give its file with `--skeleton {name}.xml`"),
-            )
+            let cause =
+                format!("this motion was made for the character `{name}`, which is not built in");
+            let remedy = format!("give the character's file with `--skeleton {name}.xml`");
+            Failure::input(&self.file, cause).with_remedy(remedy)
         })
     }
 
@@ -133,9 +134,9 @@ impl Preparation {
         let file = &self.file;
         if locate::has_extension(file, "clip") {
             self.import.refuse_for(file, "a clip")?;
-            return Clip::load(file).map_err(|e| Failure::clip(file, e));
+            return Ok(Clip::load(file)?);
         }
-        import::load(file, &self.import.options()).map_err(|e| Failure::input(file, e))
+        Ok(import::load(file, &self.import.options())?)
     }
 
     fn map(&self, clip: &Clip) -> Outcome<Option<HumanoidMap>> {
@@ -144,7 +145,7 @@ impl Preparation {
         };
         let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
         let map =
-            HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::input(path, e))?;
+            HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::in_file(path, e))?;
         Ok(Some(map))
     }
 }

@@ -1,26 +1,29 @@
-//! The only place that prints: results on standard output, talk on standard error.
+//! The only file that prints: results on standard output, everything else on standard error.
 
 use crate::args::Talk;
 use crate::failure::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mimic::clip::{Problem, Severity};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
 
+/// How and how much is printed.
 #[derive(Clone, Copy)]
 pub struct Printer {
     json: bool,
     quiet: bool,
     verbose: bool,
-    /// Results go to a person at a terminal.
+    /// Standard output is a terminal.
     shown: bool,
-    /// Talk does.
+    /// Standard error is a terminal.
     heard: bool,
     color: bool,
 }
 
 impl Printer {
+    /// As the flags ask for, and as fits where the two streams go.
     pub fn new(talk: &Talk) -> Self {
         let heard = stderr().is_terminal();
         let no_color = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
@@ -34,6 +37,7 @@ impl Printer {
         }
     }
 
+    /// Whether results are JSON.
     pub fn is_json(&self) -> bool {
         self.json
     }
@@ -47,6 +51,19 @@ impl Printer {
         }
     }
 
+    /// The result of work that failed in part. In JSON the object holds the error too, so that it stays the only one.
+    pub fn partial_result(
+        &self,
+        mut json: Value,
+        text: impl FnOnce() -> String,
+        failure: Failure,
+    ) -> Outcome {
+        json["error"] = failure.json();
+        self.result(&json, text)?;
+        Err(failure.partly())
+    }
+
+    /// One JSON object on a line of its own.
     pub fn json_line(&self, json: &impl Serialize) -> Outcome {
         let line = serde_json::to_string(json)
             .map_err(|e| Failure::work(format!("cannot write the result as JSON: {e}")))?;
@@ -56,34 +73,35 @@ impl Printer {
     /// Text on standard output, ended by a line break.
     pub fn text(&self, text: &str) -> Outcome {
         let mut out = stdout().lock();
-        out.write_all(text.as_bytes())?;
-        if !text.ends_with('\n') {
-            out.write_all(b"\n")?;
-        }
-        Ok(out.flush()?)
+        let end: &[u8] = if text.ends_with('\n') { b"" } else { b"\n" };
+        out.write_all(text.as_bytes())
+            .and_then(|()| out.write_all(end))
+            .and_then(|()| out.flush())
+            .map_err(|e| Failure::print(&e))
     }
 
-    /// What is going on; for people at a terminal, or whoever asks for it.
+    /// Says what is going on, to people at a terminal and with `--verbose`.
     pub fn note(&self, text: impl AsRef<str>) {
         if !self.quiet && (self.heard || self.verbose) {
             self.talk(text.as_ref());
         }
     }
 
-    /// What has to be known also where nobody watches.
+    /// Says what has to be known even where standard error goes to a file.
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.quiet {
             self.talk(text.as_ref());
         }
     }
 
-    /// What only the curious want to know.
+    /// Says what only `--verbose` asks for.
     pub fn detail(&self, text: impl AsRef<str>) {
         if self.verbose && !self.quiet {
             self.talk(text.as_ref());
         }
     }
 
+    /// Says what may be wrong with the result.
     pub fn warn(&self, text: impl AsRef<str>) {
         if !self.quiet {
             self.talk(&format!(
@@ -94,7 +112,7 @@ impl Printer {
         }
     }
 
-    /// Problems of a file: warnings and errors always, notes for the curious.
+    /// Says what was found in a file: warnings and errors always, notes with `--verbose`.
     pub fn problems(&self, problems: &[Problem]) {
         for problem in problems {
             let line = format!("{} [{}]", problem.message, problem.id);
@@ -123,15 +141,24 @@ impl Printer {
         self.heard && !self.quiet && !(self.json && self.shown)
     }
 
-    /// Ends the command: says what went wrong, if anything, and gives the exit code.
+    /// Ends the command: says what went wrong, if anything, and returns the exit code.
     pub fn finish(&self, outcome: Outcome) -> ExitCode {
         let Err(failure) = outcome else {
             return ExitCode::SUCCESS;
         };
         if let Some(message) = failure.message() {
-            self.talk(&format!("{} {message}", self.paint("error:", "31;1")));
+            self.error(message);
         }
-        failure.exit_code()
+        if self.json && matches!(failure, Failure::Failed(_)) {
+            json_error(&failure);
+        }
+        failure.code().into()
+    }
+
+    /// Says what went wrong, even with `--quiet`.
+    pub fn error(&self, text: impl AsRef<str>) {
+        let label = self.paint("error:", "31;1");
+        self.talk(&format!("{label} {}", text.as_ref()));
     }
 
     /// A closed standard error is no reason to stop working.
@@ -146,15 +173,12 @@ impl Printer {
             text.to_string()
         }
     }
+}
 
-    /// What went wrong with one of several files, said also when little is to be said.
-    pub fn error(&self, text: impl AsRef<str>) {
-        self.talk(&format!(
-            "{} {}",
-            self.paint("error:", "31;1"),
-            text.as_ref()
-        ));
-    }
+/// The error as a JSON object on standard output.
+pub fn json_error(failure: &Failure) {
+    // A reader that went away doesn't change what happened.
+    writeln!(stdout(), "{}", json!({ "error": failure.json() })).ok();
 }
 
 #[cfg(test)]

@@ -190,9 +190,7 @@ pub fn failure(error: RunError) -> Failure {
         RunError::Learn(error) | RunError::Train(TrainError::Learn(error)) => learn_failure(error),
         RunError::Io { action: "read", .. } => Failure::user(error),
         RunError::Io { .. } => Failure::work(error),
-        RunError::File(error) | RunError::Motion(MotionError::File(error)) => {
-            Failure::explained(&error)
-        }
+        RunError::File(error) | RunError::Motion(MotionError::File(error)) => error.into(),
         error => Failure::user(error),
     }
 }
@@ -228,14 +226,6 @@ mod tests {
     use super::*;
     use mimic::file::{FileError, Flaw, Format};
 
-    fn code(failure: &Failure) -> u8 {
-        match failure {
-            Failure::ClosedPipe => 0,
-            Failure::Work(_) => 1,
-            Failure::User(_) => 2,
-        }
-    }
-
     #[test]
     fn what_cannot_be_written_or_ran_away_is_failed_work() {
         let denied = || std::io::ErrorKind::PermissionDenied.into();
@@ -249,20 +239,20 @@ mod tests {
             flaw,
         };
         let (write, read) = (|| file(Flaw::Write(denied())), file(Flaw::Read(denied())));
-        assert_eq!(code(&failure(write().into())), 1);
-        assert_eq!(code(&failure(read.into())), 2);
-        assert_eq!(code(&failure(MotionError::from(write()).into())), 1);
+        assert_eq!(failure(write().into()).code(), 1);
+        assert_eq!(failure(read.into()).code(), 2);
+        assert_eq!(failure(MotionError::from(write()).into()).code(), 1);
         let wild = LearnError::NotFinite {
             what: "rewards",
             sample: 3,
         };
-        assert_eq!(code(&failure(TrainError::Learn(wild).into())), 1);
+        assert_eq!(failure(TrainError::Learn(wild).into()).code(), 1);
         let setting = LearnError::Setting {
             name: "gamma",
             value: "3".into(),
             range: "0..=1",
         };
-        assert_eq!(code(&learn_failure(setting)), 2);
+        assert_eq!(learn_failure(setting).code(), 2);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The rerun viewer, a program of its own.
+//! The rerun viewer, a program of its own: finding, starting and reaching it.
 
 use crate::failure::{Failure, Outcome};
 use std::fmt::Display;
@@ -9,20 +9,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Version of the recordings that we write. Viewers read those of their own version best.
+/// Version of the recordings that we write. A viewer reads recordings of its own version best.
 pub const VERSION: &str = "0.36.3";
 
-/// Where a viewer listens.
-const PLACE: ([u8; 4], u16) = ([127, 0, 0, 1], rerun::DEFAULT_SERVER_PORT);
+/// Where a viewer listens unless told otherwise: this machine, and rerun's own default port.
+const PLACE: ([u8; 4], u16) = ([127, 0, 0, 1], 9876);
 
-/// How long a viewer may take to answer.
+/// How long a viewer may take to answer. Chosen: a network round trip takes well below a second.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// How long it may take to start.
+/// How long a viewer may take to start. Chosen: a first start on a busy machine takes several seconds.
 const START: Duration = Duration::from_secs(15);
 
+/// An installed viewer.
 pub struct Viewer {
     path: PathBuf,
-    /// As it states it; `None` where it states none.
+    /// The version it states; `None` where it states none.
     pub version: Option<String>,
 }
 
@@ -37,25 +38,27 @@ impl Viewer {
         Some(Self { path, version })
     }
 
-    /// The viewer, or a failure that says what to do without one.
+    /// The viewer, or a failure that says how to get one.
     pub fn require() -> Outcome<Self> {
         Self::find().ok_or_else(|| {
-            Failure::work(format!(
-                "the rerun viewer is not installed: {}, or write the recording to a file with `--save out.rrd`",
+            Failure::work("the rerun viewer is not installed").with_remedy(format!(
+                "{}, or write the recording to a file with `--save out.rrd`",
                 install()
             ))
         })
     }
 
+    /// Where it is installed.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
+    /// Whether it has the version of our recordings.
     pub fn fits(&self) -> bool {
         self.version.as_deref() == Some(VERSION)
     }
 
-    /// Opens a window that stays when we are gone, or finds the one that is open; gives its address.
+    /// Opens a window that stays open after this program ends, or finds one that is open already. Returns its address.
     pub fn open(&self) -> Outcome<String> {
         let place = SocketAddr::from(PLACE);
         if !answers(place) {
@@ -65,7 +68,7 @@ impl Viewer {
         Ok(address(&place.to_string()))
     }
 
-    /// Its streams are closed: whoever reads ours would else wait for the viewer's end.
+    /// Starts the viewer with its streams closed: a program that reads ours would otherwise wait for the viewer's end.
     fn start(&self, port: u16) -> Outcome<Child> {
         let mut command = Command::new(&self.path);
         command
@@ -74,13 +77,13 @@ impl Viewer {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null());
-        // A Ctrl-C that is meant for us doesn't close the window.
+        // In a process group of its own, so that a Ctrl-C for this program leaves the window open.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.spawn().map_err(|e| self.broken(e))
     }
 
-    /// The program that was started may only start the viewer and end well.
+    /// Waits until the viewer listens. The program that was started may be a launcher, which ends well before that.
     fn await_answer(&self, place: SocketAddr, viewer: &mut Child) -> Outcome {
         let begun = Instant::now();
         while begun.elapsed() < START {
@@ -94,17 +97,15 @@ impl Viewer {
             std::thread::sleep(Duration::from_millis(100));
         }
         let seconds = START.as_secs();
-        Err(self.broken(format!(
-            "it doesn't listen at `{place}` after {seconds} s; write the recording to a file with `--save`"
-        )))
+        Err(self.broken(format!("it does not listen at `{place}` after {seconds} s")))
     }
 
-    /// Serves a recording to browsers until it is stopped. What the viewer says is talk, so that standard output
-    /// has nothing but our result.
+    /// Serves a recording to web browsers until it is stopped. What the viewer prints goes to standard error, so that
+    /// standard output holds nothing but our result.
     pub fn serve(&self, recording: &Path) -> Outcome {
         let stopped = Arc::new(AtomicBool::new(false));
         let flag = stopped.clone();
-        // The viewer ends by the same Ctrl-C; we outlive it to clean up.
+        // Ctrl-C reaches both programs. It ends the viewer; we stay to remove the temporary file.
         ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).ok();
         let mut command = Command::new(&self.path);
         command
@@ -121,13 +122,17 @@ impl Viewer {
 
     fn ended(&self, status: ExitStatus) -> Failure {
         let path = self.path.display();
-        Failure::work(format!(
-            "the viewer `{path}` ended with {status}; start it by itself to see why, or write the recording to a file with `--save`"
-        ))
+        Failure::work(format!("the viewer `{path}` ended with {status}")).with_remedy(
+            "start it by itself to see why, or write the recording to a file with `--save`",
+        )
     }
 
     fn broken(&self, cause: impl Display) -> Failure {
-        Failure::work(format!("cannot start `{}`: {cause}", self.path.display()))
+        Failure::work(format!(
+            "cannot start the viewer `{}`: {cause}",
+            self.path.display()
+        ))
+        .with_remedy("write the recording to a file with `--save`")
     }
 }
 
@@ -135,7 +140,7 @@ fn answers(place: SocketAddr) -> bool {
     TcpStream::connect_timeout(&place, PATIENCE).is_ok()
 }
 
-/// Ended by Ctrl-C, of which our own handler may not have heard yet.
+/// Whether a program was ended by Ctrl-C. Our own handler may not have run yet.
 #[cfg(unix)]
 fn interrupted(status: ExitStatus) -> bool {
     const SIGINT: i32 = 2;
@@ -148,7 +153,7 @@ fn interrupted(_: ExitStatus) -> bool {
     false
 }
 
-/// Address of a viewer that listens at `host:port`, unless it is a whole address already.
+/// Address of a viewer that listens at `host:port`. A whole address stays as it is.
 pub fn address(place: &str) -> String {
     if place.contains("://") {
         place.to_string()
@@ -157,21 +162,19 @@ pub fn address(place: &str) -> String {
     }
 }
 
-/// Whether somebody listens at `address`; a recording sent to nobody would wait for ever.
+/// Fails where no viewer listens at `address`: sending would wait for one for ever.
 pub fn reach(address: &str) -> Outcome {
     let place = address.split("://").last().unwrap_or_default();
     let place = place.split('/').next().unwrap_or_default();
     let found = place.to_socket_addrs().map_err(|e| {
-        Failure::user(format!(
-            "`{address}` is no address of a viewer ({e}), give one as host:port"
-        ))
+        Failure::user(format!("`{address}` is not the address of a viewer ({e})"))
+            .with_remedy("give one as host:port")
     })?;
     if found.into_iter().any(answers) {
         return Ok(());
     }
-    Err(Failure::work(format!(
-        "no viewer listens at `{place}`, start one with `rerun`"
-    )))
+    Err(Failure::work(format!("no viewer listens at `{place}`"))
+        .with_remedy("start one with `rerun`"))
 }
 
 /// How to get the viewer.
@@ -189,4 +192,14 @@ fn stated_version(path: &Path) -> Option<String> {
     words
         .find(|word| word.starts_with(|c: char| c.is_ascii_digit()))
         .map(str::to_string)
+}
+
+#[cfg(all(test, feature = "rerun"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_port_is_that_of_rerun() {
+        assert_eq!(PLACE.1, rerun::DEFAULT_SERVER_PORT);
+    }
 }

@@ -1,34 +1,34 @@
-//! Learning curves of runs, one beside the other.
+//! The learning curves of runs: a grid of panels, a colour per run.
 
-use super::{escaped, svg, tick_step};
+use super::svg::{escaped, svg, tick_step};
 use std::fmt::Write;
 
 const COLUMNS: usize = 3;
 const PANEL: [f64; 2] = [300.0, 150.0];
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 20.0;
-/// Above a panel for its heading, below it for its axis.
+/// Space above a panel for its heading, and below it for its axis.
 const HEAD: f64 = 30.0;
 const FOOT: f64 = 34.0;
 const TITLE: f64 = 40.0;
 const LEGEND_ROW: f64 = 20.0;
 
-/// Room between a curve and the frame, as a share of what it spans.
+/// Space between a curve and the frame, as a share of the curve's range.
 const MARGIN: f64 = 0.05;
 
-/// Distinguished also by who sees few colours (Okabe & Ito).
+/// Colours that people with colour blindness can tell apart too (Okabe and Ito).
 const COLORS: [&str; 7] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444",
 ];
 
-/// How a panel's vertical axis runs.
+/// The scale of a panel's vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
     Linear,
     Logarithmic,
 }
 
-/// One figure of every run.
+/// One figure of all runs.
 pub struct Panel {
     pub heading: &'static str,
     pub scale: Scale,
@@ -40,11 +40,11 @@ pub struct Panel {
 #[derive(Clone, Debug, Default)]
 pub struct Curve {
     pub raw: Vec<(f64, f64)>,
-    /// Drawn in front; the same as `raw` where nothing is smoothed.
+    /// The smoothed curve, drawn in front; the same as `raw` if nothing is smoothed.
     pub smooth: Vec<(f64, f64)>,
 }
 
-/// Panels in rows of three over the samples learned from, a legend of `runs` on top.
+/// Panels in rows of three over the number of samples, under a legend of the `runs`.
 pub fn curves(runs: &[String], panels: &[Panel]) -> String {
     let samples = panels.iter().flat_map(|p| &p.curves).flat_map(|c| &c.raw);
     let most = samples.map(|(x, _)| *x).fold(1.0, f64::max);
@@ -65,7 +65,7 @@ pub fn curves(runs: &[String], panels: &[Panel]) -> String {
     svg(width, top + rows * cell[1] + 8.0, &body)
 }
 
-/// Names with their colours, as many in a row as fit; gives where the panels begin.
+/// Draws the names with their colours, as many in a row as fit. Returns where the panels begin.
 fn legend(body: &mut String, runs: &[String], width: f64) -> f64 {
     let (mut x, mut y) = (LEFT, TITLE + 8.0);
     for (number, run) in runs.iter().enumerate() {
@@ -133,7 +133,7 @@ fn draw(body: &mut String, panel: &Panel, [left, top]: [f64; 2], most: f64) {
     .ok();
 }
 
-/// A single point is a dot.
+/// Draws a curve; a single point becomes a dot.
 fn line(body: &mut String, class: &str, color: &str, points: impl Iterator<Item = [f64; 2]>) {
     let points: Vec<[f64; 2]> = points.collect();
     if let [[x, y]] = points[..] {
@@ -167,7 +167,7 @@ fn text(body: &mut String, [x, y]: [f64; 2], class: &str, text: &str) {
     .ok();
 }
 
-/// The vertical axis of a panel; of a logarithmic one the ends are exponents of ten.
+/// The vertical axis of a panel. The ends of a logarithmic axis are powers of ten.
 struct Axis {
     scale: Scale,
     low: f64,
@@ -175,8 +175,8 @@ struct Axis {
 }
 
 impl Axis {
-    /// As wide as the curves are; where all are beyond zero on one side, not down to it unless it is near or they are
-    /// flat; flat at zero, or logarithmic, half a unit on either side.
+    /// The range of the curves with a margin. It includes zero if that is near or the curves are flat. Curves that are flat
+    /// at zero, or flat on a logarithmic axis, get half a unit on either side.
     fn of(panel: &Panel) -> Self {
         let curves = || {
             panel
@@ -253,7 +253,7 @@ impl Axis {
     }
 }
 
-/// As [`number`], but with all the digits that tell it from the next, a `step` away.
+/// As [`number()`], with enough digits to differ from the next mark, a `step` away.
 fn mark(value: f64, step: f64) -> String {
     let short = number(value);
     if short != number(value + step) && short != number(value - step) {
@@ -263,7 +263,7 @@ fn mark(value: f64, step: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// Three digits are enough for most numbers.
+/// A number with three significant digits at most.
 fn number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
@@ -277,7 +277,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Samples as people count them.
+/// A number of samples, in thousands or millions.
 fn count(samples: f64) -> String {
     match samples {
         0.0 => "0".to_owned(),

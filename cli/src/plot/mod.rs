@@ -1,59 +1,7 @@
-//! Drawings (SVG): what all of them share.
+//! Drawings as SVG files: the tracks of a motion, and the learning curves of runs.
 
 pub mod curves;
+mod svg;
 mod tracks;
 
 pub use tracks::tracks;
-
-/// Distance of tick marks, at least, in pixels.
-const TICK_ROOM: f64 = 30.0;
-
-/// 1, 2 or 5 times a power of ten, so that ticks on an axis of `pixels` for `range` keep their distance.
-fn tick_step(range: f64, pixels: f64) -> f64 {
-    let least = range * TICK_ROOM / pixels;
-    let power = 10f64.powf(least.log10().floor());
-    let step = [1.0, 2.0, 5.0]
-        .map(|m| m * power)
-        .into_iter()
-        .find(|step| *step >= least);
-    step.unwrap_or(10.0 * power)
-}
-
-/// Adding nothing turns a negative zero into a plain one.
-fn short(value: f64) -> String {
-    format!("{}", (value * 1e4).round() / 1e4 + 0.0)
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
-}
-
-/// A file with its own style and ground: it needs nothing else.
-fn svg(width: f64, height: f64, body: &str) -> String {
-    format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:.0}" width="{width}" height="{height:.0}">
-<style>
-text {{ font: 12px system-ui, sans-serif; fill: #333 }}
-.title {{ font-size: 16px; font-weight: 600 }} .heading {{ font-weight: 600 }}
-.tick {{ text-anchor: end; fill: #777 }} .time {{ text-anchor: middle; fill: #777 }}
-.line {{ fill: none; stroke-width: 1.6; stroke-linejoin: round }} .raw {{ fill: none; stroke-width: 1; opacity: .22 }}
-.grid {{ fill: none; stroke: #e4e4e4 }} .frame {{ fill: none; stroke: #bbb }}
-</style>
-<rect width="100%" height="100%" fill="#fff"/>
-{body}</svg>
-"##
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_are_round_and_sparse() {
-        assert_eq!(tick_step(4.0, 120.0), 1.0);
-        assert_eq!(tick_step(1.0, 120.0), 0.5);
-        assert!((tick_step(0.03, 120.0) - 0.01).abs() < 1e-12);
-        assert_eq!([short(-0.5), short(-0.0), short(20.0)], ["-0.5", "0", "20"]);
-    }
-}

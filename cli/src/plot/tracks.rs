@@ -1,6 +1,6 @@
-//! A motion's tracks as a drawing.
+//! The tracks of a motion: panels over time, one below the other.
 
-use super::{escaped, short, svg, tick_step};
+use super::svg::{escaped, short, svg, tick_step};
 use mimic::motion::Motion;
 use std::fmt::Write;
 
@@ -20,7 +20,7 @@ struct Line<'a> {
     values: Vec<f64>,
 }
 
-/// Contacts, centre of mass, momenta and what the ground can't supply, over time.
+/// Draws contacts, centre of mass, momenta, the force that no contact can supply, and phase.
 pub fn tracks(motion: &Motion) -> String {
     let tracks = &motion.tracks;
     let mut sheet = Sheet::new(motion);
@@ -33,11 +33,11 @@ pub fn tracks(motion: &Motion) -> String {
     sheet.panel("linear momentum, kg·m/s", &xyz(&tracks.linear_momentum));
     sheet.panel("angular momentum, kg·m²/s", &xyz(&tracks.angular_momentum));
     let unsupported = Line {
-        name: "size",
+        name: "magnitude",
         color: COLORS[3],
         values: tracks.unsupported_force().collect(),
     };
-    sheet.panel("force that no ground contact supplies, N", &[unsupported]);
+    sheet.panel("force that no contact can supply, N", &[unsupported]);
     let phase = Line {
         name: "phase",
         color: COLORS[3],
@@ -58,7 +58,7 @@ fn xyz(track: &[nalgebra::Vector3<f64>]) -> [Line<'static>; 3] {
 
 struct Sheet {
     body: String,
-    /// Where the next panel begins.
+    /// Top of the next panel.
     y: f64,
     duration: f64,
     fps: f64,
@@ -82,7 +82,7 @@ impl Sheet {
         LEFT + share.min(1.0) * (WIDTH - LEFT - RIGHT)
     }
 
-    /// A bar for every stretch in which a body stands on the ground.
+    /// Draws a bar for every stretch of time in which a body touches the ground.
     fn lanes(&mut self, motion: &Motion) {
         let names = motion.contact_names();
         self.heading("ground contact");
@@ -188,7 +188,7 @@ impl Sheet {
         self.body.push('\n');
     }
 
-    /// The time axis below the last panel, and the whole as a file.
+    /// Draws the time axis below the last panel, and returns the file.
     fn finish(mut self) -> String {
         let bottom = self.y - GAP;
         let step = tick_step(self.duration, 2.5 * PANEL);
@@ -210,7 +210,7 @@ impl Sheet {
     }
 }
 
-/// First frame and the frame after the last of every run of `true`.
+/// Every run of `true`, as its first frame and the frame after its last.
 fn stretches(down: &[bool]) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     let mut start = None;

@@ -1,6 +1,6 @@
 //! An agent's episode as a recording.
 
-use super::{Actor, Curve, Recording, Shove, parts};
+use super::content::{Actor, Curve, Recording, Shove, parts};
 use mimic::evaluate::{Frame, Trace};
 use mimic::motion::Motion;
 use mimic::sim::LinkState;
@@ -9,7 +9,7 @@ use mimic::task::{Dynamics, Stage, TERM_NAMES};
 use nalgebra::{Isometry3, Vector3};
 
 impl Recording {
-    /// Agent and reference of one episode.
+    /// The recording of one episode: the agent, its reference, and what the agent earned.
     pub fn of_trace(name: &str, trace: &Trace, motion: &Motion, stage: &Stage) -> Self {
         let skeleton: &Skeleton = &stage.skeleton;
         let frames = &trace.frames;
@@ -77,7 +77,7 @@ fn shoves(trace: &Trace) -> Vec<Shove> {
 }
 
 fn rewards(frames: &[Frame]) -> Vec<Curve> {
-    // A term that is never more than nothing is none that this reward has.
+    // A term that stays at zero belongs to another reward.
     let earned =
         |(index, _): &(usize, &&str)| frames.iter().any(|f| f.terms.values()[*index] > 0.0);
     let term = |(index, name): (usize, &&str)| Curve {

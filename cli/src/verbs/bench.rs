@@ -1,4 +1,4 @@
-//! `mimic bench`: how fast this machine is at every stage of the work.
+//! `mimic bench`: measures how fast this machine is at every stage of the work.
 
 use crate::args::at_least_one;
 use crate::failure::{Failure, Outcome};
@@ -20,26 +20,26 @@ use std::time::{Duration, Instant};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic bench                       about ten seconds
-  mimic bench --seconds 10 --json   longer and steadier, for scripts";
+  mimic bench                       measure for about ten seconds
+  mimic bench --seconds 10 --json   measure longer, for steadier numbers";
 
-/// The same clip on every machine.
+/// The clip that is measured with, built in so that machines can be compared.
 const CLIP: &[u8] = include_bytes!("../../../clips/walk.glb");
 
-/// Longest measurement: an hour is longer than any needs.
+/// Longest measurement, seconds: an hour is more than any needs.
 const MOST_SECONDS: f64 = 3600.0;
 
 /// Length of an environment's episode, seconds.
 const HORIZON_S: f64 = 20.0;
 
-/// Measure this machine: physics, environment, training and retargeting
+/// Measure how fast this machine simulates, trains and retargets
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Seconds for each measurement
+    /// Length of each measurement, in seconds
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     seconds: f64,
-    /// Threads [default: all]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     threads: Option<usize>,
 }
@@ -62,7 +62,7 @@ struct Report {
     retarget_frames_per_second: f64,
 }
 
-/// What is measured with.
+/// All that the measurements need.
 struct Bench {
     plan: Plan,
     clip: Clip,
@@ -105,7 +105,7 @@ impl Args {
     }
 }
 
-/// A built-in input that fails is our own fault.
+/// The inputs are built in, so a failure is a fault of the program.
 fn broken(error: impl std::fmt::Display) -> Failure {
     Failure::work(format!("cannot measure: {error}"))
 }

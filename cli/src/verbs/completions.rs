@@ -1,9 +1,8 @@
-//! `mimic completions`: shell completions.
+//! `mimic completions`: prints completions for a shell.
 
-use crate::args::Cli;
 use crate::failure::Outcome;
 use crate::printer::Printer;
-use clap::CommandFactory;
+use clap::Command;
 use clap_complete::Shell;
 use serde_json::json;
 
@@ -13,19 +12,19 @@ Examples:
   mimic completions zsh > ~/.zfunc/_mimic
   mimic completions fish > ~/.config/fish/completions/mimic.fish";
 
-/// Print completions for a shell
+/// Print shell completions
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Shell that is to complete `mimic` commands
+    /// Shell to print completions for
     #[arg(value_enum)]
     shell: Shell,
 }
 
 impl Args {
-    pub fn run(self, printer: &Printer) -> Outcome {
+    pub fn run(self, mut command: Command, printer: &Printer) -> Outcome {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "mimic", &mut script);
+        clap_complete::generate(self.shell, &mut command, "mimic", &mut script);
         let script = String::from_utf8_lossy(&script).into_owned();
         printer.result(&json!({ "text": script }), || script.clone())
     }

@@ -1,7 +1,8 @@
-//! `mimic doctor`: whether this machine has what the work needs.
+//! `mimic doctor`: checks whether this machine has what the work needs.
 
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
+use crate::recording;
 use crate::viewer::{self, Viewer};
 use serde::Serialize;
 use serde_json::json;
@@ -9,12 +10,12 @@ use std::path::Path;
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic doctor                      a table
-  mimic doctor --json               the same for scripts
+  mimic doctor                      print a table
+  mimic doctor --json               print JSON for scripts
 
-Exit code 1 means that something needed is missing; what would merely be nice to have does not count.";
+Exit code 1 means that something necessary is missing. Optional things don't count.";
 
-/// Check this machine, and say how to mend what is missing
+/// Check this machine, and say how to fix what is missing
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {}
@@ -23,7 +24,7 @@ pub struct Args {}
 #[serde(rename_all = "lowercase")]
 enum State {
     Good,
-    /// Something works less well without it.
+    /// Something is slower or unavailable without it.
     Weak,
     /// Nothing works without it.
     Missing,
@@ -43,14 +44,12 @@ impl Args {
         let checks = [cores(), simd(), folder(), viewer(), clips(library)];
         let missing: Vec<_> = ids(&checks, State::Missing);
         let json = json!({ "ok": missing.is_empty(), "checks": &checks });
-        printer.result(&json, || table(&checks))?;
         if missing.is_empty() {
-            return Ok(());
+            return printer.result(&json, || table(&checks));
         }
-        Err(Failure::work(format!(
-            "missing here: {}",
-            missing.join(", ")
-        )))
+        let failure = Failure::work(format!("this machine lacks: {}", missing.join(", ")))
+            .with_remedy("follow the advice in the table");
+        printer.partial_result(json, || table(&checks), failure)
     }
 }
 
@@ -72,7 +71,7 @@ fn cores() -> Check {
             State::Weak
         },
         found: format!("{threads} hardware threads"),
-        remedy: (threads < 2).then(|| "training uses every core it gets; give it more".into()),
+        remedy: (threads < 2).then(|| "give it more cores: training uses all of them".into()),
     }
 }
 
@@ -88,7 +87,7 @@ fn simd() -> Check {
         state: if good { State::Good } else { State::Weak },
         found: format!("AVX2 {}, FMA {}", yes(avx2), yes(fma)),
         remedy: (!good).then(|| {
-            "networks run several times slower without; use a processor of 2013 or later".into()
+            "use a processor from 2013 or later: networks run several times slower without".into()
         }),
     }
 }
@@ -107,7 +106,7 @@ fn yes(flag: bool) -> &'static str {
     if flag { "yes" } else { "no" }
 }
 
-/// Proves by writing that this folder can hold results.
+/// Shows by writing a file that this folder can hold results.
 fn folder() -> Check {
     let probe = format!(".mimic-doctor-{}", std::process::id());
     let written = std::fs::write(&probe, b"mimic").and_then(|()| std::fs::remove_file(&probe));
@@ -125,18 +124,26 @@ fn folder() -> Check {
         },
         remedy: written
             .is_err()
-            .then(|| "go to a folder of your own, or name one with `--out`".into()),
+            .then(|| "work in a folder of your own, or name one with `--out`".into()),
     }
 }
 
 fn viewer() -> Check {
+    if !recording::AVAILABLE {
+        return Check {
+            id: "viewer",
+            state: State::Weak,
+            found: "this build cannot write recordings".into(),
+            remedy: Some(recording::HOW_TO_GET.into()),
+        };
+    }
     let Some(viewer) = Viewer::find() else {
         return Check {
             id: "viewer",
             state: State::Weak,
             found: "rerun is not on the search path".into(),
             remedy: Some(format!(
-                "{}; `mimic replay --save` works without",
+                "{}; `mimic replay --save` works without it",
                 viewer::install()
             )),
         };
@@ -149,7 +156,7 @@ fn viewer() -> Check {
         found: format!("rerun {version} at {}", viewer.path().display()),
         remedy: (!good).then(|| {
             format!(
-                "recordings are for {}: {}",
+                "recordings are written for version {}: {}",
                 viewer::VERSION,
                 viewer::install()
             )
@@ -167,12 +174,12 @@ fn clips(library: &Path) -> Check {
             State::Weak
         },
         found: match &count {
-            Ok(count) => format!("{} with {count} entries", library.display()),
-            Err(_) => format!("no folder {}", library.display()),
+            Ok(count) => format!("{} has {count} entries", library.display()),
+            Err(_) => format!("there is no folder {}", library.display()),
         },
         remedy: count
             .is_err()
-            .then(|| "name one with `--library DIR` or `MIMIC_LIBRARY`; paths work without".into()),
+            .then(|| "name the folder of your clips with `--library DIR` or `MIMIC_LIBRARY`, or give paths".into()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! `mimic edit`: clips become another clip.
+//! `mimic edit`: makes one clip of others.
 
 use crate::args::{positive, span};
 use crate::clip_report::ClipReport;
@@ -8,35 +8,37 @@ use crate::output::{make_room, result_path};
 use crate::printer::Printer;
 use mimic::clip::Clip;
 use mimic::clip::edit::Plane;
+use mimic::explain::Explain;
 use mimic::humanoid::{self, HumanoidMap};
 use mimic::import;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
-Edits are made in the order in which they stand above, whatever the order on the line: each clip is
-trimmed and mirrored, then they are joined, and the rest is done to the whole.
+Edits are applied in the order of the list above, whatever their order on the command line: each clip is
+trimmed and mirrored, then the clips are joined, and the other edits apply to the whole.
 
 Examples:
-  mimic edit kick.clip --mirror                     the other leg: writes kick-edited.clip
-  mimic edit take.fbx --loop --in-place             the best cycle of a long take, on the spot
+  mimic edit kick.clip --mirror                     kick with the other leg (writes kick-edited.clip)
+  mimic edit take.fbx --loop --in-place             cut the best cycle of a long take, on the spot
   mimic edit take.clip --trim 2..9 --loop --shortest 2
   mimic edit walk.clip kick.clip --blend 0.4 --out combo.clip
   mimic edit run.clip --speed 1.2 --fps 60
-  mimic edit jump.clip --warp 0:0,0.5:0.8,1:1       what was at 0.5 s comes at 0.8 s";
+  mimic edit jump.clip --warp 0:0,0.5:0.8,1:1       delay what happens at 0.5 s to 0.8 s";
 
-/// How long a blend lasts where nothing is said, s.
+/// Default length of a blend, seconds. Chosen.
 const BLEND: f64 = 0.2;
-/// Shortest cycle that is looked for where nothing is said, s.
+/// Default of the shortest cycle that is looked for, seconds. Chosen: a bit shorter than the two steps of
+/// fast running.
 const SHORTEST: f64 = 0.5;
 
 /// Trim, mirror, join, loop, time-warp and resample clips
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Clips, or files that `mimic import` reads; several are joined one after another
+    /// Clips, or animation files as for `mimic import`; several are joined in this order
     #[arg(required = true, value_name = "CLIP")]
     clips: Vec<PathBuf>,
-    /// Clip to write, or a folder for it [default: NAME-edited.clip in this folder]
+    /// Clip to write, or a folder [default: NAME-edited.clip in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -44,44 +46,44 @@ pub struct Args {
 }
 
 #[derive(clap::Args)]
-#[command(next_help_heading = "Edits, in their order")]
+#[command(next_help_heading = "Edits, in the order they are applied")]
 struct Edits {
-    /// Part of each clip to keep, in seconds
+    /// Part of each clip to keep, in seconds, e.g. 0.5..2
     #[arg(long, value_name = "A..B", value_parser = span)]
     trim: Option<(f64, f64)>,
     /// Swap left and right
     #[arg(long)]
     mirror: bool,
-    /// Joint map for `--mirror`, as `mimic info --write-map` writes it [default: found out]
+    /// Joint map for `--mirror`, as written by `mimic info --write-map` [default: found by joint names and rest pose]
     #[arg(long, value_name = "FILE", requires = "mirror")]
     map: Option<PathBuf>,
-    /// Seconds over which clips that are joined blend into each other [default: 0.2]
+    /// Seconds over which joined clips blend into each other [default: 0.2]
     #[arg(long, value_name = "S", value_parser = not_negative)]
     blend: Option<f64>,
-    /// Cut out the best cycle and close its seam
+    /// Cut out the best cycle and make its end lead into its start
     #[arg(long = "loop")]
     loops: bool,
-    /// Shortest cycle for `--loop`, in seconds [default: 0.5]
+    /// Shortest cycle that `--loop` may choose, in seconds [default: 0.5]
     #[arg(long, value_name = "S", value_parser = positive, requires = "loops")]
     shortest: Option<f64>,
-    /// How many times as fast it becomes
+    /// Playback speed factor: 2 is twice as fast, 0.5 half as fast
     #[arg(long, value_name = "FACTOR", value_parser = positive, conflicts_with = "warp")]
     speed: Option<f64>,
-    /// Moments and when they are to come, in seconds: FROM:TO,FROM:TO
+    /// Move moments in time: FROM:TO,FROM:TO in seconds; the time between them is stretched evenly
     #[arg(long, value_name = "POINTS", value_parser = points)]
     warp: Option<Points>,
-    /// Take the steady travel over the ground out
+    /// Remove the steady travel over the ground
     #[arg(long)]
     in_place: bool,
-    /// Metres per second to add, forward and to the left
+    /// Add steady travel: X forward and Y to the left, in metres per second
     #[arg(long, value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
     travel: Option<(f64, f64)>,
-    /// Frames per second to resample at
+    /// Frames per second to resample to
     #[arg(long, value_name = "HZ", value_parser = positive)]
     fps: Option<f64>,
 }
 
-/// Moments of a clip and the times to which they come, s.
+/// Moments of a clip and when they are to happen, seconds.
 #[derive(Clone)]
 struct Points(Vec<(f64, f64)>);
 
@@ -90,7 +92,7 @@ impl Args {
         self.refuse_nothing()?;
         let inputs = self.clips.iter();
         let inputs: Vec<PathBuf> = inputs
-            .map(|clip| locate::file(clip, library, &locate::CLIPS))
+            .map(|clip| locate::clip(clip, library, &locate::CLIPS))
             .collect::<Outcome<_>>()?;
         let first = inputs[0].as_path();
         let stem = first.file_stem().unwrap_or_default().to_string_lossy();
@@ -100,7 +102,7 @@ impl Args {
             clips.push(self.edits.prepare(input)?);
         }
         let edited = self.edits.apply(clips);
-        let mut clip = edited.map_err(|e| Failure::input(first, e))?;
+        let mut clip = edited.map_err(|e| Failure::in_file(first, e))?;
         clip.name = output
             .file_stem()
             .unwrap_or_default()
@@ -109,26 +111,24 @@ impl Args {
         for input in &inputs {
             make_room(&output, input, "clip")?;
         }
-        clip.save(&output).map_err(|e| Failure::clip(&output, e))?;
+        clip.save(&output)?;
         let report = ClipReport::new(&output, clip);
         printer.problems(report.problems());
         printer.result(&report, || report.line())
     }
 
-    /// A command that would change nothing is a mistake.
+    /// Refuses a command that would change nothing: it must be a mistake.
     fn refuse_nothing(&self) -> Outcome {
         let several = self.clips.len() > 1;
         if self.edits.blend.is_some() && !several {
-            return Err(Failure::user(
-                "`--blend` has nothing to blend; name the clips that are to follow each other",
-            ));
+            return Err(Failure::user("`--blend` needs at least two clips")
+                .with_remedy("name the clip that is to follow"));
         }
         if several || self.edits.are_any() {
             return Ok(());
         }
-        Err(Failure::user(
-            "nothing to edit; name what is to be done, such as `--mirror`, or another clip to follow",
-        ))
+        Err(Failure::user("there is nothing to edit")
+            .with_remedy("choose an edit, such as `--mirror`, or name another clip to join"))
     }
 }
 
@@ -144,17 +144,19 @@ impl Edits {
             || self.fps.is_some()
     }
 
-    /// One of the clips, with the edits that are made before they are joined.
+    /// Reads one of the clips and applies the edits that come before joining.
     fn prepare(&self, input: &Path) -> Outcome<Clip> {
         let mut clip = read(input)?;
         if let Some((from, to)) = self.trim {
-            clip = clip.trim(from, to).map_err(|e| Failure::input(input, e))?;
+            clip = clip
+                .trim(from, to)
+                .map_err(|e| Failure::in_file(input, e))?;
         }
         if self.mirror {
             let map = self.map(&clip, input)?;
             let pairs = humanoid::pairs(&clip.joints, &map);
             let mirrored = clip.mirror(&pairs, &Plane::sagittal(&clip.joints, &pairs));
-            clip = mirrored.map_err(|e| Failure::input(input, e))?;
+            clip = mirrored.map_err(|e| Failure::in_file(input, e))?;
         }
         Ok(clip)
     }
@@ -163,19 +165,17 @@ impl Edits {
         if let Some(path) = &self.map {
             let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
             return HumanoidMap::from_json(&text, &clip.joints)
-                .map_err(|e| Failure::input(path, e));
+                .map_err(|e| Failure::in_file(path, e));
         }
         humanoid::map(&clip.joints).map_err(|e| {
-            let remedy =
-                "complete what `mimic info --write-map` writes, and give it with `--map FILE`";
-            Failure::input(
-                input,
-                format!("left and right aren't known, so it can't be mirrored: {e}; {remedy}"),
+            let cause = format!("left and right are not known, so the clip cannot be mirrored: {}", e.explain().cause);
+            Failure::input(input, cause).with_remedy(
+                "complete the map that `mimic info --write-map` writes, and pass it with `--map FILE`",
             )
         })
     }
 
-    /// The clips as one, and what is done to that.
+    /// Joins the clips and applies the edits that come after that.
     fn apply(&self, clips: Vec<Clip>) -> Result<Clip, mimic::clip::Error> {
         let mut clip = match <[Clip; 1]>::try_from(clips) {
             Ok([one]) => one,
@@ -205,16 +205,10 @@ impl Edits {
 }
 
 fn read(input: &Path) -> Outcome<Clip> {
-    if locate::has_extension(input, "motion") {
-        return Err(Failure::input(
-            input,
-            "is a motion, edits are made to clips; edit its clip and `mimic retarget` that again",
-        ));
-    }
     if locate::has_extension(input, "clip") {
-        return Clip::load(input).map_err(|e| Failure::clip(input, e));
+        return Ok(Clip::load(input)?);
     }
-    import::load(input, &import::Options::default()).map_err(|e| Failure::input(input, e))
+    Ok(import::load(input, &import::Options::default())?)
 }
 
 fn number(text: &str) -> Result<f64, String> {
@@ -232,7 +226,7 @@ fn number(text: &str) -> Result<f64, String> {
 fn not_negative(text: &str) -> Result<f64, String> {
     match number(text)? {
         number if number >= 0.0 => Ok(number),
-        _ => Err("a negative number".into()),
+        _ => Err("must not be negative".into()),
     }
 }
 

@@ -1,10 +1,10 @@
-//! `mimic import`: animation files become clips.
+//! `mimic import`: reads animation files and writes clips.
 
 use crate::args::ImportArgs;
 use crate::clip_report::ClipReport;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{file_name, make_room, names_folder, result_path};
+use crate::output::{make_room, names_folder, result_path, safe_name};
 use crate::printer::Printer;
 use mimic::import;
 use serde_json::json;
@@ -13,20 +13,20 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic import kick.fbx                             writes kick.clip
-  mimic import pack.glb --take run --out run.clip   one take of many
-  mimic import pack.glb --take all --out clips/     each take as a clip of its own
+  mimic import kick.fbx                             write kick.clip
+  mimic import pack.glb --take run --out run.clip   import one take of many
+  mimic import pack.glb --take all --out clips/     write a clip for each take
   mimic import walk.fbx --trim 0.5..1.6 --loop wrap
-  mimic import mixamo/*.fbx --out clips/            many files into a folder";
+  mimic import mixamo/*.fbx --out clips/            import many files into a folder";
 
 /// Read animation files and write them as clips
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FBX, glTF, BVH, AMC or DeepMimic files
+    /// FBX, glTF, VRM, BVH, AMC or DeepMimic files
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Clip to write, or a folder for many [default: NAME.clip in this folder]
+    /// Clip to write, or a folder for several [default: NAME.clip in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
     /// Swap left and right
@@ -39,7 +39,7 @@ pub struct Args {
 /// Asks for every take of a file.
 const ALL: &str = "all";
 
-/// One take to read and where its clip goes.
+/// One take to read, and where its clip goes.
 struct Step {
     input: PathBuf,
     /// As for [`import::Options`].
@@ -70,31 +70,29 @@ impl Args {
                 .iter()
                 .try_for_each(|one| printer.result(one, || one.line()));
         }
-        print(&reports, &failures, printer)?;
-        summary(failures, steps.len(), printer)
+        finish(&reports, failures, printer)
     }
 
-    /// Everything that can be wrong with the command is found before the first file is written.
+    /// What is read and where it is written. Whatever can be wrong with the command shows here, before the first write.
     fn plan(&self, library: &Path) -> Outcome<Vec<Step>> {
         let many = self.files.len() > 1 || self.wants_all();
         if let Some(out) = self.out.as_deref().filter(|out| many && !names_folder(out)) {
             let out = out.display();
-            return Err(Failure::user(format!(
-                "several clips can't become the one file `{out}`, name a folder: `--out {out}/`"
-            )));
+            let cause = format!("several clips cannot be written to one file, `{out}`");
+            return Err(Failure::user(cause).with_remedy(format!("name a folder: `--out {out}/`")));
         }
         let mut taken = BTreeMap::new();
         let mut steps = Vec::new();
         for file in &self.files {
-            let input = locate::file(file, library, &locate::SOURCES)?;
+            let input = locate::clip(file, library, &locate::SOURCES)?;
             for (take, name) in self.takes(&input)? {
                 let output = result_path(self.out.as_deref(), &name, "clip");
                 if let Some(other) = taken.insert(output.clone(), input.clone()) {
                     let (other, output) = (other.display(), output.display());
-                    return Err(Failure::input(
-                        &input,
-                        format!("would become `{output}`, as would `{other}`"),
-                    ));
+                    let cause =
+                        format!("its clip would be `{output}`, and so would that of `{other}`");
+                    return Err(Failure::input(&input, cause)
+                        .with_remedy("import the two into different folders (`--out`)"));
                 }
                 steps.push(Step {
                     input: input.clone(),
@@ -121,18 +119,17 @@ impl Args {
             };
             return Ok(vec![(take, name)]);
         }
-        let found = import::inspect(input).map_err(|e| Failure::input(input, e))?;
+        let found = import::inspect(input)?;
         let takes = found.takes;
         if takes.is_empty() {
-            let told = found.problems.iter().find(|p| p.id == "no-takes");
-            let reason = told.map_or("holds no animation", |p| p.message.as_str());
-            return Err(Failure::input(input, reason));
+            // Import refuses such a file, and says what it holds instead.
+            import::load(input, &import::Options::default())?;
         }
         let mut names: Vec<String> = Vec::new();
         for (at, take) in takes.iter().enumerate() {
-            // What exporters put before a `|` is the armature's name.
+            // Exporters put the armature's name and a `|` before that of the take.
             let short = take.name.rsplit('|').next().unwrap_or(&take.name);
-            let name = file_name(&format!("{stem}-{short}"));
+            let name = safe_name(&format!("{stem}-{short}"));
             let is_new = !names.contains(&name);
             names.push(if is_new {
                 name
@@ -151,9 +148,8 @@ impl Args {
             output,
         } = step;
         if locate::has_extension(input, "clip") {
-            return Err(Failure::input(
-                input,
-                "is a clip already, `mimic retarget` takes it as it is and `mimic edit` changes it",
+            return Err(Failure::input(input, "this is a clip already").with_remedy(
+                "pass it to `mimic retarget` as it is, or change it with `mimic edit`",
             ));
         }
         let options = import::Options {
@@ -161,40 +157,37 @@ impl Args {
             mirror: self.mirror,
             ..self.import.options()
         };
-        let clip = import::load(input, &options).map_err(|e| Failure::input(input, e))?;
+        let clip = import::load(input, &options)?;
         make_room(output, input, "clip")?;
-        clip.save(output).map_err(|e| Failure::clip(output, e))?;
+        clip.save(output)?;
         Ok(ClipReport::new(output, clip))
     }
 }
 
-/// A file, and why it became no clip.
+/// A file, and why there is no clip of it.
 type Failed<'a> = (&'a Path, Failure);
 
-/// The results of several files.
-fn print(reports: &[ClipReport], failures: &[Failed], printer: &Printer) -> Outcome {
-    if printer.is_json() {
-        let failure =
-            |(file, failure): &Failed| json!({ "file": file, "message": failure.message() });
-        let failures: Vec<_> = failures.iter().map(failure).collect();
-        return printer.json_line(&json!({ "clips": reports, "failures": failures }));
-    }
-    reports
-        .iter()
-        .try_for_each(|report| printer.text(&report.line()))
-}
-
-/// Ends as the worst of the files did.
-fn summary(failures: Vec<Failed>, clips: usize, printer: &Printer) -> Outcome {
-    let count = failures.len();
-    for (_, failure) in &failures {
+/// Reports several files. The command fails if one of them did, and ends with the exit code of the worst.
+fn finish(reports: &[ClipReport], failed: Vec<Failed>, printer: &Printer) -> Outcome {
+    for (_, failure) in &failed {
         printer.error(failure.message().unwrap_or_default());
     }
-    let message = format!("{count} of {clips} clips could not be made");
-    let is_user = |(_, failure): &Failed| matches!(failure, Failure::User(_));
-    match failures.iter().all(is_user) {
-        _ if count == 0 => Ok(()),
-        true => Err(Failure::user(message)),
-        false => Err(Failure::work(message)),
+    let entry = |(file, failure): &Failed| {
+        let mut entry = failure.json();
+        entry["file"] = json!(file);
+        entry
+    };
+    let entries: Vec<_> = failed.iter().map(entry).collect();
+    let report = json!({ "clips": reports, "failures": entries });
+    let text = || {
+        let lines: Vec<_> = reports.iter().map(ClipReport::line).collect();
+        lines.join("\n")
+    };
+    let all = reports.len() + failed.len();
+    let cause = format!("{} of {all} clips could not be imported", failed.len());
+    match failed.iter().map(|(_, failure)| failure.code()).min() {
+        None => printer.result(&report, text),
+        Some(1) => printer.partial_result(report, text, Failure::work(cause)),
+        Some(_) => printer.partial_result(report, text, Failure::user(cause)),
     }
 }

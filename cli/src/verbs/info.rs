@@ -1,6 +1,6 @@
 //! `mimic info`: what is in an animation file.
 
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::locate;
 use crate::output::{make_room, write_whole};
 use crate::printer::Printer;
@@ -14,22 +14,22 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic info kick.fbx                          takes, joints, and which joint is which
-  mimic info kick.fbx --write-map kick.json    the joint map as a file to edit, for `retarget --map`
-  mimic info kick.clip --json                  for scripts";
+  mimic info kick.fbx                          show takes, joints and the joint map
+  mimic info kick.fbx --write-map kick.json    write the joint map to edit it, then use it with `--map`
+  mimic info kick.clip --json                  print JSON for scripts";
 
-/// Show what is in an animation file: takes, joints, units, joint map, problems
+/// Show what is in an animation file: takes, joints, units, joint map and problems
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// FBX, glTF, BVH, ASF/AMC or DeepMimic file, or a clip
     file: PathBuf,
-    /// Write the joint map to a file that can be edited and given to `retarget --map`
+    /// Write the joint map to FILE, to be edited and passed to `mimic retarget --map`
     #[arg(long, value_name = "FILE")]
     write_map: Option<PathBuf>,
 }
 
-/// What every kind of file has to tell.
+/// What is in a file of any kind.
 #[derive(Serialize)]
 struct Report {
     file: String,
@@ -53,7 +53,7 @@ pub struct Row {
 
 impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
-        let file = locate::file(&self.file, library, &locate::CLIPS)?;
+        let file = locate::clip(&self.file, library, &locate::CLIPS)?;
         let (mut report, joints) = look(&file)?;
         let map = match humanoid::map(&joints) {
             Ok(map) => map,
@@ -80,7 +80,7 @@ fn not_humanoid(reason: &humanoid::Error) -> Problem {
     }
 }
 
-/// The map as a file to edit. What has to be named in it is there as `null`.
+/// The map as a file to edit. If a required slot has no joint, all slots are listed, and those without a joint are `null`.
 fn map_file(map: &HumanoidMap, joints: &[Joint]) -> String {
     if empty(map).is_empty() {
         return map.to_json(joints);
@@ -93,6 +93,7 @@ fn map_file(map: &HumanoidMap, joints: &[Joint]) -> String {
     format!("{{\n{}\n}}\n", Slot::ALL.map(line).join(",\n"))
 }
 
+/// Required slots without a joint.
 fn empty(map: &HumanoidMap) -> Vec<&'static str> {
     let needed = Slot::REQUIRED.into_iter();
     let empty = needed.filter(|slot| map.joint(*slot).is_none());
@@ -106,16 +107,16 @@ fn tell(path: &Path, map: &HumanoidMap, printer: &Printer) {
     }
     let empty = empty.join(", ");
     printer.warn(format!(
-        "`{path}` needs joints for {empty}: write their names there, `mimic info --json` lists them under `joints`"
+        "`{path}` needs joints for {empty}; write their names there (`mimic info --json` lists all `joints`)"
     ));
 }
 
 fn look(file: &Path) -> Outcome<(Report, Vec<Joint>)> {
     if locate::has_extension(file, "clip") {
-        let clip = Clip::load(file).map_err(|e| Failure::clip(file, e))?;
+        let clip = Clip::load(file)?;
         return Ok(of_clip(file, clip));
     }
-    let found = import::inspect(file).map_err(|e| Failure::input(file, e))?;
+    let found = import::inspect(file)?;
     let report = Report {
         file: file.display().to_string(),
         format: found.format,
@@ -222,7 +223,7 @@ fn section(text: &mut String, title: &str) {
     line(text, format!("\n{title}"));
 }
 
-/// Writing to a string can't fail.
+/// Adds a line. Writing to a string cannot fail.
 fn line(text: &mut String, line: String) {
     writeln!(text, "{}", line.trim_end()).ok();
 }

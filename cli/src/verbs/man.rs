@@ -1,31 +1,30 @@
-//! `mimic man`: manual pages.
+//! `mimic man`: prints or writes the manual pages.
 
-use crate::args::Cli;
 use crate::failure::{Failure, Outcome};
 use crate::output::write_whole;
 use crate::printer::Printer;
-use clap::{Command, CommandFactory};
+use clap::Command;
 use clap_mangen::Man;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic man | man -l -                              read the manual now
-  mimic man --out ~/.local/share/man/man1           a page for mimic, and one for every command";
+  mimic man | man -l -                              read the manual
+  mimic man --out ~/.local/share/man/man1           write a page for mimic and one per command";
 
-/// Print the manual page, or write a page for every command
+/// Print the manual page, or write one page per command
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Folder for `mimic.1` and a page for every command
+    /// Folder to write mimic.1 and a page per command to
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 impl Args {
-    pub fn run(self, printer: &Printer) -> Outcome {
-        let mut command = Cli::command().disable_help_subcommand(true);
+    pub fn run(self, command: Command, printer: &Printer) -> Outcome {
+        let mut command = command.disable_help_subcommand(true);
         command.build();
         let Some(folder) = self.out else {
             let page = page(command)?;
@@ -51,6 +50,8 @@ fn write_pages(command: &Command, folder: &Path) -> Outcome<Vec<String>> {
 
 fn page(command: Command) -> Outcome<String> {
     let mut page = Vec::new();
-    Man::new(command).render(&mut page)?;
+    Man::new(command)
+        .render(&mut page)
+        .map_err(|e| Failure::print(&e))?;
     Ok(String::from_utf8_lossy(&page).into_owned())
 }

@@ -14,13 +14,31 @@ pub mod retarget;
 pub mod tracks;
 pub mod train;
 
-use crate::args::Verb;
 use crate::failure::Outcome;
 use crate::printer::Printer;
+use clap::{Command, Subcommand};
 use std::path::Path;
 
-/// Runs one verb.
-pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
+/// What can be done.
+#[derive(Subcommand)]
+pub enum Verb {
+    Info(info::Args),
+    Import(import::Args),
+    Edit(edit::Args),
+    Retarget(retarget::Args),
+    Tracks(tracks::Args),
+    Train(train::Args),
+    Eval(eval::Args),
+    Replay(replay::Args),
+    Plot(plot::Args),
+    Bench(bench::Args),
+    Doctor(doctor::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// Runs one verb. `command` is the whole command line, for those that describe it.
+pub fn run(verb: Verb, command: Command, library: &Path, printer: &Printer) -> Outcome {
     match verb {
         Verb::Info(args) => args.run(library, printer),
         Verb::Import(args) => args.run(library, printer),
@@ -33,7 +51,7 @@ pub fn run(verb: Verb, library: &Path, printer: &Printer) -> Outcome {
         Verb::Bench(args) => args.run(printer),
         Verb::Replay(args) => args.run(library, printer),
         Verb::Doctor(args) => args.run(library, printer),
-        Verb::Completions(args) => args.run(printer),
-        Verb::Man(args) => args.run(printer),
+        Verb::Completions(args) => args.run(command, printer),
+        Verb::Man(args) => args.run(command, printer),
     }
 }

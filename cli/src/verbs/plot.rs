@@ -1,4 +1,4 @@
-//! `mimic plot`: how runs learned.
+//! `mimic plot`: draws the learning curves of runs.
 
 use crate::failure::{Failure, Outcome};
 use crate::locate;
@@ -11,17 +11,17 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic plot                                     the newest run, as kick.svg
-  mimic plot kick kick-seed7 --out seeds.svg     two runs over each other
-  mimic plot kick --smooth 1                     every iteration as it was
-  mimic plot kick --json > curves.json           the numbers as well
+  mimic plot                                     draw the newest run, e.g. as kick.svg
+  mimic plot kick kick-seed7 --out seeds.svg     draw two runs in the same panels
+  mimic plot kick --smooth 1                     draw every iteration, without smoothing
+  mimic plot kick --json > curves.json           write the numbers as well
 
-Thin lines are single iterations, thick ones means around each. Dots are the evaluation of a finished run.";
+Thin lines show single iterations, thick lines their moving average. Dots show the evaluation at the end.";
 
-/// A curve of this many points is smooth enough.
+/// By default a curve is averaged over the run's length divided by this. Chosen: noise fades, and rises stay visible.
 const SMOOTH_POINTS: usize = 50;
 
-/// What is drawn: field of metrics.jsonl, heading, scale.
+/// The panels: field of metrics.jsonl, heading, scale.
 const FIGURES: [(&str, &str, Scale); 10] = [
     ("return", "return of an episode", Scale::Linear),
     ("normalized_return", "normalised return", Scale::Linear),
@@ -43,28 +43,28 @@ const FIGURES: [(&str, &str, Scale); 10] = [
     ("samples_per_second", "samples per second", Scale::Linear),
 ];
 
-/// The same of eval.json, beside the samples learned from.
+/// The panels from eval.json: field, heading.
 const EVALUATED: [(&str, &str); 2] = [
     ("survival", "evaluation: survival"),
     ("mpjpe_local_mm", "evaluation: local error, mm"),
 ];
 
-/// Draw learning curves of runs, several over each other (SVG)
+/// Draw the learning curves of one or several runs
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Run folders, or their names in runs/ [default: the newest run]
     #[arg(value_name = "RUN")]
     runs: Vec<PathBuf>,
-    /// Iterations whose mean a point is; 1 for none [default: a fiftieth of the run]
+    /// Iterations to average each point over; 1 draws them as they are [default: a fiftieth of the run]
     #[arg(long, value_name = "N", value_parser = crate::args::at_least_one)]
     smooth: Option<usize>,
-    /// File to write, or a folder [default: the run's name, or `curves.svg` for several]
+    /// SVG file to write, or a folder [default: RUN.svg, or curves.svg for several runs]
     #[arg(long, short, value_name = "FILE.svg")]
     out: Option<PathBuf>,
 }
 
-/// What a run wrote while it learned.
+/// What a run logged while it learned.
 struct Log {
     name: String,
     folder: PathBuf,
@@ -105,27 +105,23 @@ impl Args {
 impl Log {
     fn read(folder: &Path) -> Outcome<Self> {
         let path = folder.join(runs::METRICS);
-        let text = std::fs::read_to_string(&path).map_err(|e| {
-            Failure::input(&path, format!("cannot be read ({e}); train the run first"))
-        })?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|e| Failure::unreadable(&path, &e).with_remedy("train the run first"))?;
         let mut lines = Vec::new();
-        // A line that is being written has no end yet.
+        // The last line has no end while it is being written.
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);
         for (number, line) in whole.lines().enumerate() {
             let line = serde_json::from_str(line).map_err(|e| {
-                let number = number + 1;
-                Failure::input(
-                    &path,
-                    format!("line {number} is no iteration ({e}); take it out"),
-                )
+                Failure::input(&path, format!("this is not an iteration ({e})"))
+                    .with_place(format!("line {}", number + 1))
+                    .with_remedy("remove the line")
             })?;
             lines.push(line);
         }
         if lines.is_empty() {
-            return Err(Failure::input(
-                &path,
-                "no iteration is in it yet; train longer",
-            ));
+            return Err(
+                Failure::input(&path, "it holds no iteration yet").with_remedy("train longer")
+            );
         }
         let name = folder.file_name().unwrap_or(folder.as_os_str());
         Ok(Self {
@@ -141,7 +137,7 @@ impl Log {
         last.and_then(Value::as_f64).unwrap_or(0.0)
     }
 
-    /// (samples, value) of every iteration that has this figure.
+    /// (samples, value) of every iteration that has this field.
     fn points(&self, field: &str) -> Vec<(f64, f64)> {
         let number = |line: &Map<String, Value>, field: &str| line.get(field)?.as_f64();
         let points = self.lines.iter();
@@ -150,7 +146,7 @@ impl Log {
             .collect()
     }
 
-    /// A figure of the evaluation, the mean over a run's motions.
+    /// A field of the evaluation, averaged over the run's motions.
     fn evaluated(&self, field: &str) -> Option<f64> {
         let evaluation = self.evaluation.as_ref()?;
         let Some(motions) = evaluation["motions"].as_array() else {
@@ -162,22 +158,20 @@ impl Log {
     }
 }
 
-/// A run that isn't finished has none.
+/// The evaluation of a run; an unfinished one has none.
 fn evaluation(path: &Path) -> Outcome<Option<Value>> {
     if !path.is_file() {
         return Ok(None);
     }
     let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
     let value = serde_json::from_str(&text).map_err(|e| {
-        Failure::input(
-            path,
-            format!("is no evaluation ({e}); make it anew with `mimic eval`"),
-        )
+        Failure::input(path, format!("this is not an evaluation ({e})"))
+            .with_remedy("write it again with `mimic eval`")
     })?;
     Ok(Some(value))
 }
 
-/// Names for the legend; where two runs share one, their folders.
+/// Names for the legend; runs of the same name go by their folders.
 fn distinct(logs: &[Log]) -> Vec<String> {
     let shared = |name: &str| logs.iter().filter(|log| log.name == name).count() > 1;
     logs.iter()
@@ -188,7 +182,7 @@ fn distinct(logs: &[Log]) -> Vec<String> {
         .collect()
 }
 
-/// Panels that any of the runs can fill.
+/// The panels for which at least one run has numbers.
 fn panels(logs: &[Log], smooth: Option<usize>) -> Vec<Panel> {
     let learned = FIGURES.iter().map(|(field, heading, scale)| Panel {
         heading,
@@ -221,8 +215,8 @@ fn curve(raw: Vec<(f64, f64)>, smooth: Option<usize>) -> Curve {
     }
 }
 
-/// Each value's mean with those around it, `window` in all; at the ends with as many as there are on both sides, so
-/// that a straight line stays one.
+/// Centred moving average over `window` values. Towards the ends the window shrinks but stays centred, so that a straight
+/// line stays straight.
 fn mean_around(points: &[(f64, f64)], window: usize) -> Vec<(f64, f64)> {
     let mut sums = vec![0.0];
     let mut sum = 0.0;

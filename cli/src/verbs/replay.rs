@@ -1,4 +1,4 @@
-//! `mimic replay`: an agent with its reference, or a motion alone, in the rerun viewer.
+//! `mimic replay`: shows an agent with its reference, or a motion, in the rerun viewer.
 
 use crate::args::{ImportArgs, RetargetArgs, at_least_one};
 use crate::failure::{Failure, Outcome};
@@ -15,15 +15,16 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic replay --rerun                      the newest run, in the viewer
-  mimic replay kick --rerun --beside        the run or clip `kick`, agent and reference side by side
-  mimic replay kick --rerun --phase 0.44    from where `mimic eval` says that it fails
-  mimic replay walk --rerun --perturb       how it takes shoves
-  mimic replay walk.fbx --save walk.rrd     imports and retargets first; open it with `rerun walk.rrd`
-  mimic replay walk-and-run --rerun --sequence walk,run,walk   one policy, from one motion into the next
+  mimic replay --rerun                      open the newest run in the viewer
+  mimic replay kick --rerun --beside        show agent and reference side by side
+  mimic replay kick --rerun --phase 0.44    start at a phase from which `mimic eval` reports a fall
+  mimic replay walk --rerun --perturb       shove the agent, and change its weight and friction
+  mimic replay walk.fbx --save walk.rrd     record the reference of a clip; `rerun walk.rrd` opens it
+  mimic replay walk-and-run --rerun --sequence walk,run,walk
+                                            go from one motion of a run to the next
   mimic replay kick --connect 127.0.0.1:9876";
 
-/// Every frame is held in memory.
+/// Longest replay, seconds: every frame is held in memory.
 const MOST_SECONDS: f64 = 3600.0;
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -35,33 +36,33 @@ fn share(text: &str) -> Result<f64, String> {
     if (0.0..=1.0).contains(&share) {
         Ok(share)
     } else {
-        Err("it lies between 0 and 1".into())
+        Err("must be between 0 and 1".into())
     }
 }
 
 /// Metres between agent and reference when they stand side by side.
 const BESIDE: f64 = 1.2;
-/// Seconds of a looping motion that are shown if nothing else is said.
+/// Default length of the replay of a looping motion, seconds.
 const SECONDS: f64 = 10.0;
-/// Seconds of each looping motion in a sequence.
+/// The same for each motion of a sequence.
 const SECONDS_IN_SEQUENCE: f64 = 4.0;
 
-/// Watch an agent with its reference, or a motion alone, in the rerun viewer
+/// Watch an agent with its reference, or a motion, in the rerun viewer
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Run, motion, clip or animation file [default: the newest run, else the newest motion]
+    /// Run, motion, clip or animation file [default: the newest run, or if there is none the newest motion]
     #[arg(value_name = "RUN|MOTION")]
     what: Option<PathBuf>,
     #[command(flatten)]
     sinks: Sinks,
-    /// Show a run's reference at the agent's side instead of over it
+    /// Show the reference beside the agent instead of in the same place
     #[arg(long)]
     beside: bool,
-    /// Seconds to show of a looping motion that a run's agent performs [default: 10, in a sequence 4 each]
+    /// Length of the replay in seconds, for looping motions of a run [default: 10; in a sequence 4 for each]
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
-    /// Where in the motion a run's agent starts, 0 to 1, as `mimic eval` names where it fails [default: 0]
+    /// Phase at which the agent starts, from 0 to 1; `mimic eval` lists those from which it fails [default: 0]
     #[arg(
         long,
         value_name = "SHARE",
@@ -70,14 +71,15 @@ pub struct Args {
         conflicts_with = "sequence"
     )]
     phase: Option<f64>,
-    /// Disturb the agent: shoves, weight and friction as in the nearest of the 32 phases of `mimic eval --perturb`
+    /// Disturb the agent by shoves and by changed weight and friction, as `mimic eval --perturb` does at the nearest of its
+    /// 32 phases
     #[arg(long, conflicts_with = "sequence")]
     perturb: bool,
-    /// Which motion to show, by number from 1, of a run that learned several [default: 1]
+    /// Motion to show of a run that learned several, by number from 1 [default: 1]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     motion: Option<usize>,
-    /// Show several motions of a run one after the other, by name or part of it, each for `--seconds` or to its end:
-    /// the agent goes over from one into the next
+    /// Motions of a run to perform one after another, by name or a part of it; looping ones last `--seconds`, others play to
+    /// their end
     #[arg(
         long,
         value_name = "NAME,...",
@@ -91,26 +93,27 @@ pub struct Args {
     retarget: RetargetArgs,
 }
 
-/// Where the recording goes; several are possible.
+/// Where the recording goes: one or several places.
 #[derive(clap::Args)]
 #[group(required = true, multiple = true)]
 struct Sinks {
-    /// Open the viewer
+    /// Open it in the viewer
     #[arg(long)]
     rerun: bool,
-    /// Write the recording to a file, or into a folder as NAME.rrd
+    /// Write it to a file, or as NAME.rrd into a folder
     #[arg(long, value_name = "FILE.rrd")]
     save: Option<PathBuf>,
-    /// Send it to a viewer that listens, e.g. 127.0.0.1:9876
+    /// Send it to a running viewer, e.g. at 127.0.0.1:9876
     #[arg(long, value_name = "ADDR")]
     connect: Option<String>,
-    /// Serve it to web browsers until stopped
+    /// Serve it to web browsers until Ctrl-C
     #[arg(long)]
     serve: bool,
 }
 
 impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
+        recording::require()?;
         let viewer = (self.sinks.rerun || self.sinks.serve)
             .then(Viewer::require)
             .transpose()?;
@@ -174,7 +177,7 @@ impl Args {
         Ok((recording, source))
     }
 
-    /// Flags about an agent have nothing to act on where there is none: refused, not ignored.
+    /// Refuses flags about an agent where there is none: nothing is ignored silently.
     fn refuse_agent_flags(&self, file: &Path) -> Outcome {
         let given = [
             ("--beside", self.beside),
@@ -187,10 +190,8 @@ impl Args {
         let Some((flag, _)) = given.into_iter().find(|(_, given)| *given) else {
             return Ok(());
         };
-        Err(Failure::input(
-            file,
-            format!("has no agent, `{flag}` is for runs; give a run, or leave it out"),
-        ))
+        let cause = format!("this has no agent, and `{flag}` applies to runs");
+        Err(Failure::input(file, cause).with_remedy("give a run, or leave the option out"))
     }
 }
 
@@ -249,7 +250,7 @@ impl Sinks {
         if !viewer.fits() {
             let version = viewer.version.as_deref().unwrap_or("of unknown version");
             printer.warn(format!(
-                "the viewer is {version}, recordings are for {}: {}",
+                "the viewer has version {version}, recordings are written for {}: {}",
                 viewer::VERSION,
                 viewer::install()
             ));
@@ -264,7 +265,7 @@ impl Sinks {
     }
 }
 
-/// Writes beside the goal and renames, so that no half recording is ever found.
+/// Writes to a temporary file beside `path` and renames it, so that nobody finds half a recording.
 pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
     make_room(path, source, "rrd")?;
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
@@ -282,14 +283,17 @@ pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
     Ok(())
 }
 
-/// Writes into `part`, which will be `path`.
+/// Writes into `part`, which becomes `path`.
 fn write(shown: &Recording, part: &Path, path: &Path) -> Outcome {
     recording::write(shown, &Sink::File(part.to_path_buf())).map_err(|e| Failure::write(path, e))
 }
 
 fn send(shown: &Recording, address: String) -> Outcome {
     viewer::reach(&address)?;
-    let failed = |e| Failure::work(format!("cannot send the recording to `{address}`: {e}"));
+    let failed = |e| {
+        Failure::work(format!("cannot send the recording to `{address}`: {e}"))
+            .with_remedy("check that the viewer still runs, or write it to a file with `--save`")
+    };
     recording::write(shown, &Sink::Viewer(address.clone())).map_err(failed)
 }
 

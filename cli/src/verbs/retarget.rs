@@ -1,4 +1,4 @@
-//! `mimic retarget`: a clip becomes a motion of a physics character.
+//! `mimic retarget`: makes a clip a motion of a physics character.
 
 use crate::args::{ImportArgs, RetargetArgs};
 use crate::checks;
@@ -12,23 +12,23 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic retarget kick.clip                          writes kick.motion
-  mimic retarget kick.fbx --out motions/            imports first
-  mimic retarget kick.fbx --map kick.json           with a map from `mimic info --write-map`, edited
-  mimic retarget kick.fbx --skeleton robot.xml      onto your own MJCF character";
+  mimic retarget kick.clip                          write kick.motion
+  mimic retarget kick.fbx --out motions/            import first, and write into a folder
+  mimic retarget kick.fbx --map kick.json           use an edited map of `mimic info --write-map`
+  mimic retarget kick.fbx --skeleton robot.xml      use your own MJCF character";
 
-/// Carry a clip onto a physics character and compute its tracks
+/// Retarget a clip to a physics character and compute its tracks
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Clip or animation file [default: the newest clip]
     #[arg(value_name = "CLIP")]
     clip: Option<PathBuf>,
-    /// Motion to write, or a folder for it [default: NAME.motion in this folder]
+    /// Motion to write, or a folder [default: NAME.motion in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Flights nearer to what a body can do, as `mimic train` asks them: as long as they can be, and turned by a part of what
-    /// they need where that is too much
+    /// Bring flights closer to what a body can do, as `mimic train` does: they last as long as the contacts allow, and their
+    /// spin is corrected in part where a full correction would change too much
     #[arg(long)]
     to_perform: bool,
     #[command(flatten)]
@@ -43,10 +43,8 @@ impl Args {
         let preparation = Preparation::new(file.clone(), &self.import, &self.retarget)
             .for_performance(self.to_perform);
         if preparation.is_motion() {
-            return Err(Failure::input(
-                &file,
-                "is retargeted already; give the clip it was made from",
-            ));
+            return Err(Failure::input(&file, "this is a motion already")
+                .with_remedy("give the clip that it was made from"));
         }
         let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
         spare_input(&output, &file)?;
@@ -58,7 +56,7 @@ impl Args {
         let quality = motion.quality(&skeleton);
         make_room(&output, &file, "motion")?;
         let seconds = seconds.unwrap_or_default();
-        motion.save(&output).map_err(|e| Failure::explained(&e))?;
+        motion.save(&output)?;
         let frames = motion.qpos.len();
         let mut report = json!({
             "motion": output,
@@ -87,10 +85,10 @@ fn text(report: &Value) -> String {
     let motion = report["motion"].as_str().unwrap_or_default();
     format!(
         "{motion}: {} frames at {:.1} Hz in {:.2} s\n  \
-         keypoint error   mean {:.1} cm, most {:.1} cm\n  \
-         skate            {:.1} cm/s while the source stands\n  \
-         penetration      mean {:.1} cm, most {:.1} cm\n  \
-         height           {:.1} cm while the source stands\n  \
+         keypoint error   mean {:.1} cm, max {:.1} cm\n  \
+         foot skate       {:.1} cm/s where the source stands\n  \
+         penetration      mean {:.1} cm, max {:.1} cm\n  \
+         float            {:.1} cm above the ground where the source stands\n  \
          joint limits     {} violations",
         report["frames"],
         number("/fps"),

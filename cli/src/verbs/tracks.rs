@@ -1,4 +1,4 @@
-//! `mimic tracks`: what a motion's body does: centre of mass, momenta, contacts, feasibility.
+//! `mimic tracks`: shows how a motion's body moves as a whole.
 
 use crate::args::{ImportArgs, RetargetArgs};
 use crate::checks;
@@ -17,21 +17,21 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic tracks kick.motion                      a summary
-  mimic tracks kick.fbx --plot kick.svg         imports and retargets first
-  mimic tracks kick.motion --csv kick.csv       every frame, for other tools";
+  mimic tracks kick.motion                      print a summary
+  mimic tracks kick.fbx --plot kick.svg         import, retarget, and draw the tracks
+  mimic tracks kick.motion --csv kick.csv       write every frame, for other tools";
 
-/// Show phase, centre of mass, momenta, contacts and feasibility of a motion
+/// Show the tracks of a motion: phase, centre of mass, momenta, contacts and feasibility
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Motion, clip or animation file [default: the newest motion]
     #[arg(value_name = "MOTION")]
     motion: Option<PathBuf>,
-    /// Draw the tracks
+    /// Draw the tracks to FILE.svg
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write every frame as comma-separated values
+    /// Write the tracks of every frame to FILE.csv, as comma-separated values
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     #[command(flatten)]
@@ -109,7 +109,7 @@ fn report(motion: &Motion, skeleton: &Skeleton) -> Report {
 fn text(report: &Report) -> String {
     let loops = match report.loop_mode {
         LoopMode::Wrap => "loops",
-        LoopMode::Clamp => "ends",
+        LoopMode::Clamp => "plays once",
     };
     let mut text = format!(
         "{} on {}: {} frames at {:.1} Hz, {:.2} s, {loops}\n\n{:32} {:>9} {:>9} {:>9}\n",
@@ -119,9 +119,9 @@ fn text(report: &Report) -> String {
         report.fps,
         report.duration_s,
         "",
-        "least",
+        "min",
         "mean",
-        "most"
+        "max"
     );
     let summary = &report.summary;
     for (name, Extent { min, mean, max }) in [
@@ -143,14 +143,14 @@ fn text(report: &Report) -> String {
         let turn = report.cycle_heading_rad.to_degrees();
         writeln!(
             text,
-            "a cycle travels {x:.2} m forward, {y:.2} m to the left, and turns {turn:.1}°"
+            "each cycle travels {x:.2} m forward and {y:.2} m to the left, and turns by {turn:.1}°"
         )
         .ok();
     }
     text + "\n" + checks::table(&report.quality).trim_end()
 }
 
-/// A row per frame.
+/// The tracks as comma-separated values, a row per frame.
 fn table(motion: &Motion) -> String {
     let tracks = &motion.tracks;
     let mut header: Vec<String> = ["frame", "time_s", "phase"].map(String::from).into();
@@ -199,7 +199,7 @@ fn table(motion: &Motion) -> String {
     text
 }
 
-/// To the micrometre and below anything that matters; without negative zeros.
+/// Six decimals, a micrometre of a length. Adding 0.0 turns a negative zero into a plain one.
 fn number(value: &f64) -> String {
     format!("{:.6}", (value * 1e6).round() / 1e6 + 0.0)
 }

@@ -207,7 +207,7 @@ impl Args {
             [first, _, _, ..] => format!("{first}-and-{}-more", names.len() - 1),
             few => few.join("-and-"),
         };
-        let name = crate::output::file_name(&name);
+        let name = crate::output::safe_name(&name);
         let folder = runs::free_folder(&name);
         if folder
             .file_name()

@@ -171,10 +171,10 @@ fn what_cannot_be_done_is_refused_with_a_remedy() {
     bench.mimic(&["retarget", "walk.clip"]).assert().success();
     bench.write("one.bvh", ONE.as_bytes());
     for (line, said) in [
-        (&["edit", "walk.clip"][..], "nothing to edit; "),
+        (&["edit", "walk.clip"][..], "there is nothing to edit"),
         (
             &["edit", "walk.clip", "--blend", "0.2"],
-            "nothing to blend; ",
+            "needs at least two clips",
         ),
         (
             &["edit", "walk.clip", "--trim", "5..6"],
@@ -182,7 +182,7 @@ fn what_cannot_be_done_is_refused_with_a_remedy() {
         ),
         (
             &["edit", "walk.clip", "--loop", "--shortest", "9"],
-            "allow shorter ones",
+            "allow shorter cycles",
         ),
         (
             &["edit", "walk.clip", "--speed", "0.000002"],
@@ -190,10 +190,13 @@ fn what_cannot_be_done_is_refused_with_a_remedy() {
         ),
         (
             &["edit", "walk.clip", "--warp", "0.5:0.8,0.4:1"],
-            "let both its times rise",
+            "let both times rise",
         ),
         (&["edit", "walk.clip", "--fps", "1e9"], "up to 10000"),
-        (&["edit", "walk.motion", "--mirror"], "edit its clip"),
+        (
+            &["edit", "walk.motion", "--mirror"],
+            "this is a motion, not a clip",
+        ),
         (&["edit", "one.bvh", "--mirror"], "`--map FILE`"),
         (
             &["edit", "walk.clip", "one.bvh"],
@@ -205,12 +208,14 @@ fn what_cannot_be_done_is_refused_with_a_remedy() {
         ),
         (
             &["edit", "walk.clip", "--mirror", "--out", "walk.clip"],
-            "is the input itself",
+            "this is the input itself",
         ),
         (&["edit", "nothing.clip", "--mirror"], "no such file"),
     ] {
-        let complaint = bench.complaint(line, 2);
-        assert!(complaint.contains(said), "{complaint}");
+        let error = bench.error(line, 2);
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains(said), "{error}");
+        assert!(error["remedy"].is_string(), "{error}");
     }
     for line in [
         &["edit"][..],

@@ -1,6 +1,6 @@
 //! 0 success, 1 the work failed, 2 wrong usage or input.
 
-use crate::workbench::{Workbench, has_remedy};
+use crate::workbench::Workbench;
 
 #[test]
 fn help_and_version_succeed() {
@@ -64,24 +64,41 @@ fn wrong_files_are_named_with_a_remedy() {
         "half.glb",
         "false.clip",
     ] {
-        let said = bench.complaint(&["info", file], 2);
-        assert!(said.starts_with(&format!("error: `{file}`: ")), "{said}");
-        assert!(has_remedy(&said, file), "{said}");
+        let error = bench.error_about(file, &["info", file], 2);
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.starts_with(&format!("`{file}`: ")), "{message}");
     }
     for file in ["empty.fbx", "notes.glb", "half.txt", "half.fbx", "half.glb"] {
-        let said = bench.complaint(&["import", file], 2);
-        assert!(has_remedy(&said, file), "{said}");
+        bench.error_about(file, &["import", file], 2);
         assert!(!bench.path(file).with_extension("clip").exists());
     }
+}
+
+/// An error is one JSON object with `--json`, that of a flag that doesn't exist as well.
+#[test]
+fn errors_are_json_too() {
+    let bench = Workbench::new();
+    let output = bench
+        .mimic(&["info", "kick.fbx", "--json", "--jsno"])
+        .assert()
+        .code(2);
+    let printed = &output.get_output().stdout;
+    let printed: serde_json::Value = serde_json::from_slice(printed).expect("one JSON object");
+    let error = &printed["error"];
+    assert_eq!(error["exit"], 2);
+    let remedy = error["remedy"].as_str().unwrap_or_default();
+    assert!(remedy.contains("'--json'"), "{error}");
+    assert!(error["file"].is_null() && error["place"].is_null());
 }
 
 #[test]
 fn what_is_not_there_is_named() {
     let bench = Workbench::new();
-    let said = bench.complaint(&["info", "kick.fbx"], 2);
-    assert!(said.contains("`kick.fbx`: no such file"), "{said}");
-    let said = bench.complaint(&["info", "far/kick.fbx"], 2);
-    assert!(said.contains("`far/kick.fbx`: no such file"), "{said}");
+    for file in ["kick.fbx", "far/kick.fbx"] {
+        let said = bench.complaint(&["info", file], 2);
+        assert!(said.contains(&format!("`{file}`: no such file")), "{said}");
+        bench.error_about(file, &["info", file], 2);
+    }
 }
 
 #[test]
@@ -90,10 +107,10 @@ fn the_input_is_never_overwritten() {
     let before = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
     for out in ["sway.txt", "./sway.txt"] {
         let said = bench.complaint(&["import", "sway.txt", "--out", out], 2);
-        assert!(said.contains("is the input itself"), "{said}");
+        assert!(said.contains("this is the input itself"), "{said}");
     }
     let said = bench.complaint(&["info", "sway.txt", "--write-map", "sway.txt"], 2);
-    assert!(said.contains("is the input itself"), "{said}");
+    assert!(said.contains("this is the input itself"), "{said}");
     let after = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
     assert_eq!(before, after);
 }
@@ -101,6 +118,8 @@ fn the_input_is_never_overwritten() {
 #[test]
 fn a_folder_that_cannot_be_made_is_failed_work() {
     let bench = Workbench::with_clip();
-    let said = bench.complaint(&["import", "sway.txt", "--out", "sway.txt/deep/a.clip"], 1);
-    assert!(said.contains("cannot write"), "{said}");
+    let line = ["import", "sway.txt", "--out", "sway.txt/deep/a.clip"];
+    let error = bench.error_about("sway.txt/deep", &line, 1);
+    let message = error["message"].as_str().unwrap_or_default();
+    assert!(message.contains("cannot be written"), "{message}");
 }

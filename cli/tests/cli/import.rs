@@ -118,7 +118,7 @@ fn of_several_files_the_failed_are_listed() {
         let output = output.get_output();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(
-            said.contains("error: `empty.fbx`"),
+            said.contains("error: `empty.fbx`: "),
             "also when quiet: {said}"
         );
         serde_json::from_slice::<Value>(&output.stdout).expect("the output is JSON")
@@ -126,8 +126,10 @@ fn of_several_files_the_failed_are_listed() {
     let report = failed(&["sway.txt", "empty.fbx"]);
     assert_eq!(report["clips"][0]["clip"], "sway.clip");
     assert_eq!(report["failures"][0]["file"], "empty.fbx");
-    let message = report["failures"][0]["message"].as_str();
-    assert!(message.is_some_and(|m| m.contains("an empty file")));
+    assert_eq!(report["failures"][0]["exit"], 2);
+    assert!(report["failures"][0]["remedy"].is_string(), "{report}");
+    let message = report["error"]["message"].as_str();
+    assert!(message.is_some_and(|m| m.contains("1 of 2")), "{report}");
     bench.write("half.fbx", b"Kaydara FBX Binary  \0\x1a\0");
     let report = failed(&["half.fbx", "empty.fbx"]);
     assert_eq!(report["clips"], json!([]));
@@ -139,11 +141,9 @@ fn our_own_files_are_sent_where_they_belong() {
     let bench = Workbench::with_clip();
     bench.mimic(&["retarget", "sway.txt"]).assert().success();
     for verb in ["info", "import"] {
-        let said = bench.complaint(&[verb, "sway.motion"], 2);
-        assert!(
-            said.contains("`sway.motion`: is a motion") && said.contains("mimic tracks"),
-            "{said}"
-        );
+        let error = bench.error_about("sway.motion", &[verb, "sway.motion"], 2);
+        let remedy = error["remedy"].as_str().unwrap_or_default();
+        assert!(remedy.contains("`mimic tracks`"), "{error}");
     }
 }
 
@@ -174,11 +174,9 @@ fn a_map_is_written_for_the_rigs_that_need_one() {
         "a line per slot"
     );
     assert_eq!(map["left-foot"], Value::Null);
-    let said = bench.complaint(&["retarget", "two.gltf", "--map", "map.json"], 2);
-    assert!(
-        said.contains("`map.json`") && said.contains("leaves `hips` empty"),
-        "null is read: {said}"
-    );
+    let line = ["retarget", "two.gltf", "--map", "map.json"];
+    let error = bench.error_about("map.json", &line, 2);
+    assert_eq!(error["place"], "slot `hips`", "null is read: {error}");
 }
 
 #[test]

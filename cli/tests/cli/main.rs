@@ -4,8 +4,12 @@ mod disturbed;
 mod edit;
 mod exit_codes;
 mod import;
+#[cfg(not(feature = "rerun"))]
+mod lean;
 mod output;
+#[cfg(feature = "rerun")]
 mod readme;
+#[cfg(feature = "rerun")]
 mod replay;
 mod stages;
 mod talk;

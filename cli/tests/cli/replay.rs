@@ -51,21 +51,24 @@ fn a_recording_is_written_whatever_the_environment_says() {
 fn flags_that_have_nothing_to_act_on_are_refused() {
     let bench = Workbench::with_run();
     for (flags, reason) in [
-        (&["--fps", "60"][..], "import options don't apply"),
-        (&["--take", "1"], "import options don't apply"),
+        (
+            &["--fps", "60"][..],
+            "import options apply to animation files",
+        ),
+        (&["--take", "1"], "import options apply to animation files"),
         (
             &["--skeleton", "humanoid"],
-            "`--skeleton`, `--map` and `--weight` don't apply",
+            "`--skeleton`, `--map` and `--weight` apply to clips",
         ),
         (
             &["--map", "map.json"],
-            "`--skeleton`, `--map` and `--weight` don't apply",
+            "`--skeleton`, `--map` and `--weight` apply to clips",
         ),
     ] {
         let line = [&["replay", "sway", "--save", "a.rrd"], flags].concat();
         let said = bench.complaint(&line, 2);
         assert!(
-            said.contains("`runs/sway`: is a run") && said.contains(reason),
+            said.contains("`runs/sway`: this is a run already") && said.contains(reason),
             "{said}"
         );
     }
@@ -80,7 +83,7 @@ fn flags_that_have_nothing_to_act_on_are_refused() {
         let line = [&["replay", "sway.txt", "--save", "a.rrd"], flags].concat();
         let said = bench.complaint(&line, 2);
         assert!(
-            said.contains("`sway.txt`: has no agent") && said.contains(flags[0]),
+            said.contains("`sway.txt`: this has no agent") && said.contains(flags[0]),
             "{said}"
         );
     }

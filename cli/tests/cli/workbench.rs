@@ -65,11 +65,31 @@ impl Workbench {
         assert_eq!(text.lines().count(), 1, "one line: {text}");
         text
     }
-}
 
-/// Whether a message names this file once, and after what is wrong says what to do.
-pub fn has_remedy(said: &str, file: &str) -> bool {
-    said.matches(file).count() == 1 && said.contains("; ")
+    /// Runs with `--json` what has to fail with `code`; gives the error that it prints, which is also what it says.
+    pub fn error(&self, arguments: &[&str], code: i32) -> Value {
+        let output = self.mimic(arguments).arg("--json").assert().code(code);
+        let output = output.get_output();
+        let printed: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        let error = printed["error"].clone();
+        assert_eq!(error["exit"], code);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let message = error["message"].as_str().expect("a message");
+        assert_eq!(said, format!("error: {message}\n"));
+        error
+    }
+
+    /// Runs what has to fail because of `file`: the error names the file, in its message once, and has a remedy.
+    pub fn error_about(&self, file: &str, arguments: &[&str], code: i32) -> Value {
+        let error = self.error(arguments, code);
+        let message = error["message"].as_str().unwrap_or_default();
+        assert_eq!(error["file"], file, "{message}");
+        assert_eq!(message.matches(file).count(), 1, "{message}");
+        let remedy = error["remedy"].as_str().unwrap_or_default();
+        assert!(!remedy.is_empty(), "no remedy: {message}");
+        assert!(message.ends_with(&format!("; {remedy}")), "{message}");
+        error
+    }
 }
 
 /// A DeepMimic motion: per frame its duration, root position and rotation, then joint rotations.

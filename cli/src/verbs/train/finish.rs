@@ -3,6 +3,7 @@
 use super::{program, unwritten};
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
+use crate::recording;
 use crate::runs;
 use crate::verbs::{eval, replay};
 use crate::viewer::{self, Viewer};
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Seconds of a looping motion in the recording of a finished run.
 const REPLAY_S: f64 = 10.0;
 
-fn recording(run: &Run) -> PathBuf {
+fn recording_file(run: &Run) -> PathBuf {
     run.dir().join("replay.rrd")
 }
 
@@ -24,7 +25,7 @@ fn evaluation(run: &Run) -> PathBuf {
 /// Saves what was learned. Results of an older policy don't stay beside a newer one, so whoever finds some knows
 /// that the run was finished.
 pub fn save(run: &Run, trainer: &Trainer) -> Result<(), RunError> {
-    for outdated in [evaluation(run), recording(run)] {
+    for outdated in [evaluation(run), recording_file(run)] {
         std::fs::remove_file(outdated).ok();
     }
     run.save(trainer)
@@ -53,7 +54,8 @@ pub fn finish(run: &Run, printer: &Printer) -> Outcome {
 /// A run that has learned all it will: what a killed session left out is made up for.
 pub fn make_up(run: &Run, trainer: &Trainer, printer: &Printer) -> Outcome {
     let folder = run.dir().display();
-    if evaluation(run).exists() && recording(run).exists() {
+    let recorded = !recording::AVAILABLE || recording_file(run).exists();
+    if evaluation(run).exists() && recorded {
         let (samples, mimic) = (trainer.samples(), program());
         return Err(Failure::user(format!(
             "`{folder}` is finished, it has learned from all its {samples} samples: \
@@ -68,11 +70,14 @@ pub fn make_up(run: &Run, trainer: &Trainer, printer: &Printer) -> Outcome {
     finish(run, printer)
 }
 
-/// The recording's file; `None` where the agent has nothing to show.
+/// The recording's file; `None` where the agent has nothing to show, or this build can't write recordings.
 fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
+    if !recording::AVAILABLE {
+        return Ok(None);
+    }
     match runs::record(run, 0, (Start::At(0.0), None), REPLAY_S) {
         Ok(shown) => {
-            let file = recording(run);
+            let file = recording_file(run);
             replay::save(&shown, &file, run.dir())?;
             Ok(Some(file))
         }

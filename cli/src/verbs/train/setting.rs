@@ -2,6 +2,7 @@
 
 use mimic::learn::Plan;
 use serde_json::Value;
+use strsim::levenshtein;
 
 /// How many names an error lists.
 const SHOWN: usize = 3;
@@ -62,23 +63,7 @@ fn paths(value: &Value) -> Vec<String> {
 /// How far a path is from one that exists; a path's last name alone is as near as the whole.
 fn distance(typed: &str, name: &str) -> usize {
     let last = |path: &str| path.rsplit(['.', '/']).next().unwrap_or(path).to_owned();
-    edits(typed, name).min(edits(&last(typed), &last(name)))
-}
-
-/// Levenshtein's distance: letters to put in, take out or change.
-fn edits(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut corner = i;
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let changed = corner + usize::from(x != *y);
-            corner = row[j + 1];
-            row[j + 1] = changed.min(corner + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
+    levenshtein(typed, name).min(levenshtein(&last(typed), &last(name)))
 }
 
 #[cfg(test)]
@@ -123,12 +108,5 @@ mod tests {
         assert!(said("gamma").contains("ppo.gamma=0.99"));
         assert!(said(r#"task.rewards={"pose": 1"#).contains("no JSON: EOF"));
         assert!(said("=3").contains("no setting"));
-    }
-
-    #[test]
-    fn edits_are_counted() {
-        assert_eq!(edits("kitten", "sitting"), 3);
-        assert_eq!(edits("", "abc"), 3);
-        assert_eq!(edits("same", "same"), 0);
     }
 }

@@ -60,7 +60,7 @@ fn a_finished_run_is_finished_only_with_its_results() {
 fn what_is_not_there_cannot_go_on() {
     let bench = with_preset();
     let said = bench.complaint(&["train", "--resume", "nothing"], 2);
-    assert!(said.contains("no run there"), "{said}");
+    assert!(said.contains("there is no run here"), "{said}");
     let said = bench.complaint(&["eval", "sway.txt"], 2);
     assert!(said.contains("a run is a folder"), "{said}");
     std::fs::write(bench.path("run"), b"").expect("a file can be written");

@@ -1,4 +1,7 @@
 use super::*;
+use crate::recording::content::{Actor, Curve, Shove, Side, parts};
+use mimic::skeleton::Skeleton;
+use nalgebra::{Isometry3, Vector3};
 
 /// A character that stands and waves its coordinates about, twice: as reference and a little late as agent.
 fn waving() -> Recording {
@@ -107,6 +110,6 @@ fn limbs_know_their_side() {
 #[test]
 fn capsules_point_from_end_to_end() {
     let (a, b) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(0.1, 0.2, -0.5));
-    let reached = scene::along(&a, &b) * nalgebra::Point3::new(0.0, 0.0, (b - a).norm());
+    let reached = world::along(&a, &b) * nalgebra::Point3::new(0.0, 0.0, (b - a).norm());
     assert!((reached.coords - b).norm() < 1e-12);
 }

@@ -1,7 +1,8 @@
-//! The three-dimensional part: bodies, centre of mass, angular momentum, contacts.
+//! The three-dimensional scene: bodies, centre of mass, angular momentum, contacts and shoves.
 
 use super::look::{self, Rgba};
-use super::{Actor, Part, Recording, Side};
+use super::names::FOLLOWED;
+use crate::recording::content::{Actor, Part, Recording, Side};
 use mimic::skeleton::Shape;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rerun::{
@@ -9,18 +10,18 @@ use rerun::{
     RecordingStream, RecordingStreamResult, TimeColumn, Transform3D, ViewCoordinates,
 };
 
-/// Length of the longest angular momentum arrow, metres.
+/// Length of the longest arrow of angular momentum, metres. Chosen: about a leg.
 const LONGEST_ARROW: f64 = 0.7;
-/// Angular momentum that is drawn that long at least, kg·m²/s: a still character shows no big arrows.
+/// Least angular momentum that gets the longest arrow, kg·m²/s. Chosen so that a still character shows no big arrows.
 const LEAST_MOMENTUM: f64 = 3.0;
 
-/// Impulse of a shove that is drawn as an arrow of a metre, N·s, and how long it is to be seen.
+/// Impulse of a shove whose arrow is a metre long, N·s. Chosen: about 1 m/s for a character of 45 kg.
 const IMPULSE_PER_METER: f64 = 40.0;
+/// How long a shove stays visible, seconds. Chosen: it lasts one frame, and the eye needs a moment.
 const SHOVE_SHOWN_S: f64 = 0.4;
 
-/// What the eye follows: the viewer frames its bounds, so two specks around the centre of mass give the distance.
-pub(super) const FOLLOWED: &str = "followed";
-/// From the centre of mass to each speck, metres.
+/// The viewer keeps the bounds of the entity it follows in view. Two specks, each this far from the centre of mass,
+/// metres, make these bounds those of a grown person.
 const FRAMED: [f64; 3] = [0.45, 0.45, 0.65];
 
 /// Logs everything below `world`.
@@ -67,7 +68,7 @@ fn bodies(
     Ok(())
 }
 
-/// A body's shapes don't change; only its transform does.
+/// Logs the shapes of a body once: only its transform changes over time.
 fn shapes(
     stream: &RecordingStream,
     path: &str,
@@ -171,7 +172,7 @@ fn momentum(
     stream.send_columns(path, times.to_vec(), arrows.columns_of_unit_batches()?)
 }
 
-/// A dot on the ground below every body that touches it.
+/// Draws a dot on the ground below every body that touches it.
 fn contacts(
     stream: &RecordingStream,
     branch: &str,
@@ -206,7 +207,7 @@ fn contacts(
     stream.send_columns(path, times.to_vec(), dots)
 }
 
-/// An arrow that ends where the agent is shoved, for a moment.
+/// Draws an arrow at each shove, for a moment. It ends where the agent is hit.
 fn shoves(
     stream: &RecordingStream,
     shown: &Recording,
@@ -240,7 +241,7 @@ fn shoves(
     stream.send_columns(path, times.to_vec(), arrows)
 }
 
-/// The way of the reference's centre of mass.
+/// Draws the path of the reference's centre of mass.
 fn trail(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {
     let way: Vec<_> = shown.reference.com.iter().map(vec3).collect();
     let line = LineStrips3D::new([way])
@@ -249,7 +250,7 @@ fn trail(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<(
     stream.log_static("world/reference/com_trail", &line)
 }
 
-/// Angular momentum that is drawn as an arrow of one metre, the same for all characters.
+/// Angular momentum per metre of arrow; the same for all characters, so that they can be compared.
 fn arrow_scale(shown: &Recording) -> f64 {
     let momenta = shown
         .actors()
@@ -258,7 +259,7 @@ fn arrow_scale(shown: &Recording) -> f64 {
     largest / LONGEST_ARROW
 }
 
-/// The frame at `a` whose Z axis points at `b`, in which the viewer draws a capsule.
+/// The frame at `a` whose Z axis points at `b`: the viewer draws capsules along Z.
 pub(super) fn along(a: &Vector3<f64>, b: &Vector3<f64>) -> Isometry3<f64> {
     let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     let turn = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a)).unwrap_or_else(half_turn);

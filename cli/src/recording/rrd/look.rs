@@ -1,8 +1,9 @@
-//! Colours, and how the characters are told apart.
+//! Colours, by which the characters and the curves are told apart.
 
-use super::Side;
+use crate::recording::content::Side;
 use rerun::Color;
 
+/// Red, green, blue and opacity, 0 to 255.
 pub type Rgba = [u8; 4];
 
 pub const BACKGROUND: Rgba = [24, 26, 31, 255];
@@ -13,7 +14,8 @@ pub const REFERENCE: Rgba = [129, 199, 245, 255];
 pub const SHOVE: Rgba = [235, 87, 87, 255];
 pub const TRAIL: Rgba = [129, 199, 245, 120];
 
-/// Told apart also by those who see red and green alike.
+/// Colours that people with red-green colour blindness can tell apart too (after Okabe and Ito, lightened for a dark
+/// background).
 const CURVES: [Rgba; 8] = [
     [86, 180, 233, 255],
     [230, 159, 0, 255],
@@ -25,7 +27,7 @@ const CURVES: [Rgba; 8] = [
     [170, 176, 186, 255],
 ];
 
-/// A solid character: warm on its right, cool on its left.
+/// Colour of a solid character: warm on its right, cool on its left.
 pub fn solid(side: Side) -> Rgba {
     match side {
         Side::Left => [66, 135, 210, 255],
@@ -34,21 +36,24 @@ pub fn solid(side: Side) -> Rgba {
     }
 }
 
-/// A character to see through.
+/// Colour of a transparent character.
 pub fn ghost(side: Side) -> Rgba {
     let [r, g, b, _] = solid(side);
     let paler = |c: u8| c / 2 + 110;
     [paler(r), paler(g), paler(b), 70]
 }
 
+/// Colour of curve number `index`.
 pub fn curve(index: usize) -> Rgba {
     CURVES[index % CURVES.len()]
 }
 
+/// Colour of what belongs to one character.
 pub fn of_actor(actor: &str) -> Rgba {
     if actor == "agent" { AGENT } else { REFERENCE }
 }
 
+/// The same for the SDK.
 pub fn color([r, g, b, a]: Rgba) -> Color {
     Color::from_unmultiplied_rgba(r, g, b, a)
 }

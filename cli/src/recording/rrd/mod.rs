@@ -1,26 +1,27 @@
-//! Where a recording goes.
+//! What the rerun viewer shows of a recording: the scene, the curves beside it, and the layout of both.
 
-use super::{Recording, blueprint, scene, series};
+mod blueprint;
+mod look;
+mod names;
+mod series;
+#[cfg(test)]
+mod tests;
+mod world;
+
+use crate::recording::content::{Recording, Sink};
+use names::{APPLICATION, TIMELINE};
 use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimeColumn};
-use std::path::PathBuf;
 use std::time::Duration;
 
-pub const APPLICATION: &str = "mimic";
-/// Seconds from the first frame.
-pub const TIMELINE: &str = "time";
-
-/// How long a viewer may take to receive everything.
+/// How long a viewer may take to receive a whole recording; on one machine that is well below a second.
 const FLUSH: Duration = Duration::from_secs(30);
 
-pub enum Sink {
-    File(PathBuf),
-    /// A viewer that listens, e.g. `rerun+http://127.0.0.1:9876/proxy`.
-    Viewer(String),
-}
-
-/// Writes the whole recording and waits until it is there.
+/// Writes the whole recording and waits until it has arrived.
+///
+/// # Errors
+/// A file that cannot be written, or a viewer that goes away.
 pub fn write(shown: &Recording, sink: &Sink) -> Result<(), Box<dyn std::error::Error>> {
-    // Somebody asked for it, whatever the variable RERUN says.
+    // The user asked for a recording, so it is written even where the variable RERUN turns the SDK off.
     let builder = RecordingStreamBuilder::new(APPLICATION)
         .recording_name(&shown.name)
         .enabled(true);
@@ -40,6 +41,6 @@ fn log(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()>
         TimeColumn::new_duration_secs(TIMELINE, seconds),
         TimeColumn::new_sequence("frame", 0..frames as i64),
     ];
-    scene::log(stream, shown, &times)?;
+    world::log(stream, shown, &times)?;
     series::log(stream, shown, &times)
 }

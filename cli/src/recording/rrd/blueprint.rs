@@ -1,9 +1,9 @@
-//! How the viewer lays a recording out. The SDK's own builder can't set a view's eye, grid or legend, so the
-//! blueprint is logged piece by piece here.
+//! How the viewer lays a recording out. The SDK's own builder cannot set a view's eye, grid or legend, so the blueprint
+//! is logged piece by piece.
 
-use super::scene::FOLLOWED;
-use super::write::{APPLICATION, TIMELINE};
-use super::{Recording, look};
+use super::look;
+use super::names::{APPLICATION, FOLLOWED, TIMELINE};
+use crate::recording::content::Recording;
 use nalgebra::{Rotation3, Vector3};
 use rerun::datatypes::Uuid;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg, RecordingId};
@@ -17,10 +17,10 @@ use rerun::external::re_sdk_types::blueprint::components::{
 };
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
-/// Travel beyond which the eye follows the character, metres.
+/// The eye follows a character that travels farther than this, metres. Chosen: a whole kick or jump stays in view below.
 const FOLLOW_BEYOND: f64 = 3.0;
 
-/// Sends the layout before the data, and makes it the one that opens.
+/// Sends the layout before the data, and makes it the layout that the viewer opens with.
 pub fn send(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {
     let (layout, storage) = RecordingStreamBuilder::new(APPLICATION)
         .recording_id(RecordingId::random())
@@ -113,7 +113,7 @@ fn scene(layout: &Layout, shown: &Recording) -> RecordingStreamResult<String> {
     Ok(view)
 }
 
-/// From the front left, far enough to see the whole motion, or following a character that travels far.
+/// The eye looks from the front left. It is far enough away to see the whole motion, or follows a character that travels.
 fn eye(shown: &Recording) -> EyeControls3D {
     let lead = shown.actors().next().map(|(_, actor)| actor);
     let com = lead.map_or(&[][..], |actor| &actor.com);
@@ -167,11 +167,11 @@ fn plot(
     Ok(view)
 }
 
-/// The blueprint's store.
+/// The stream that the layout is logged to.
 struct Layout<'a>(&'a RecordingStream);
 
 impl Layout<'_> {
-    /// A view and what it shows; gives its path.
+    /// Logs a view of everything below `origin`, and returns its path.
     fn view(
         &self,
         number: u8,
@@ -244,7 +244,7 @@ fn uuid(number: u8) -> Uuid {
     Uuid { bytes }
 }
 
-/// As the viewer spells the same identifier in a path.
+/// The same identifier as the viewer writes it in a path.
 fn hyphenated(number: u8) -> String {
     format!("00000000-0000-0000-0000-{number:012x}")
 }

@@ -1,12 +1,13 @@
 //! The curves beside the scene.
 
-use super::Recording;
 use super::look::{self, Rgba};
+use crate::recording::content::Recording;
 use rerun::{
     RecordingStream, RecordingStreamResult, Scalars, SeriesLines, StateChange, StateConfiguration,
     TimeColumn,
 };
 
+/// The state of a body that touches the ground.
 const DOWN: &str = "down";
 
 /// Logs everything below `plots`.
@@ -72,7 +73,7 @@ fn line(
     stream.send_columns(path, times.to_vec(), columns)
 }
 
-/// A lane for every body that may touch the ground, filled while it does.
+/// Draws a lane for every body that may touch the ground, filled while it does.
 fn contacts(
     stream: &RecordingStream,
     shown: &Recording,
