@@ -1,4 +1,5 @@
-//! Writes a smooth made-up motion of a skeleton, for `tests/outside/mujoco_motion.py` to check against MuJoCo.
+//! Writes a smooth made-up motion of a skeleton, and beside it as JSON the masses of its bodies and the torques of its joints,
+//! for `tests/outside/mujoco_motion.py` to check against MuJoCo.
 //!
 //! `cargo run --release --example random_motion OUT.motion [SKELETON]`
 
@@ -38,11 +39,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         qpos,
         contact_bodies: Vec::new(),
         contact: None,
-        report: json!({ "masses": masses(&skeleton) }),
     };
-    let mut motion = Motion::from_poses(&skeleton, draft);
-    motion.report["joint_torques"] = json!(motion.joint_torques(&skeleton));
-    motion.save(Path::new(&out))?;
+    let motion = Motion::from_poses(&skeleton, draft);
+    motion.save(&out)?;
+    let beside =
+        json!({ "masses": masses(&skeleton), "joint_torques": motion.joint_torques(&skeleton) });
+    std::fs::write(Path::new(&out).with_extension("json"), beside.to_string())?;
     Ok(())
 }
 

@@ -76,7 +76,6 @@ fn motion(clip: &str) -> Option<(Skeleton, Motion)> {
         qpos,
         contact_bodies: feet.iter().filter_map(|n| body(n)).collect(),
         contact: None,
-        report: serde_json::Value::Null,
     };
     Some((skeleton.clone(), Motion::from_poses(&skeleton, draft)))
 }

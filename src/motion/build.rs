@@ -20,8 +20,6 @@ pub struct Draft {
     pub contact_bodies: Vec<usize>,
     /// `contact[f][c]` per contact body; found from the poses, with the ground at z = 0, if `None`.
     pub contact: Option<Vec<Vec<bool>>>,
-    /// The retarget report, as JSON.
-    pub report: serde_json::Value,
 }
 
 impl Motion {
@@ -86,7 +84,7 @@ impl Motion {
             qvel,
             bodies,
             tracks,
-            report: draft.report,
+            report: None,
         }
     }
 

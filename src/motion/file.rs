@@ -6,7 +6,7 @@
 //! `linear_momentum` and `angular_momentum` \[F, 3\], `contact` u8 \[F, C\], `root_wrench_residual` \[F, 6\]. A file that
 //! another program wrote may have f32 in place of f64. The metadata has the fields of [`Header`].
 
-use super::{Cycle, Motion, MotionError, Tracks};
+use super::{Cycle, Motion, MotionError, RetargetReport, Tracks};
 use crate::clip::{LoopMode, MOST_FPS, stored_rotation};
 use crate::file::{self, Flaw, Format, Reader, Writer};
 use nalgebra::{Isometry3, Quaternion, Translation3, Vector3, Vector6};
@@ -32,7 +32,8 @@ struct Header {
     bodies: Vec<String>,
     /// Names of the contact bodies, in the order of the columns of `contact`.
     contact_bodies: Vec<String>,
-    report: serde_json::Value,
+    #[serde(default)]
+    report: Option<RetargetReport>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -8,6 +8,7 @@ mod momentum;
 mod nnls;
 mod phase;
 mod quality;
+mod report;
 mod sample;
 pub mod skate;
 mod summary;
@@ -19,6 +20,7 @@ mod wrench;
 pub use build::Draft;
 pub use error::MotionError;
 pub use quality::Check;
+pub use report::{MappedJoint, RetargetReport, Spread};
 pub use summary::{ContactShare, Extent, Summary};
 
 use crate::clip::LoopMode;
@@ -73,8 +75,8 @@ pub struct Motion {
     /// `bodies[f][b]`: world from body.
     pub bodies: Vec<Vec<Isometry3<f64>>>,
     pub tracks: Tracks,
-    /// The retarget report, as JSON.
-    pub report: serde_json::Value,
+    /// What retargeting says about the motion; `None` for one that was made in another way.
+    pub report: Option<RetargetReport>,
 }
 
 impl Cycle {

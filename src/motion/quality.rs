@@ -161,10 +161,9 @@ impl Motion {
     /// # Panics
     /// If the motion is not one of `skeleton`'s (see [`Motion::check_skeleton`]).
     pub fn quality(&self, skeleton: &Skeleton) -> Vec<Check> {
-        let reported = |kind: &Kind, pointer: &str| {
-            let value = self.report.pointer(pointer)?.as_f64()?;
-            Some(kind.check(value, None))
-        };
+        let report = self.report.as_ref();
+        let keypoints = report.map(|report| report.keypoint_error_m.mean);
+        let disagreement = report.and_then(|report| report.contact_disagreement);
         let frames = || 0..self.qpos.len();
         let depth = |f: usize| -skeleton.lowest_point(&self.bodies[f]);
         let outside = |f: usize| limits::violations(skeleton, &self.qpos[f]) as f64;
@@ -179,8 +178,8 @@ impl Motion {
         let high: Vec<bool> = frames().map(high).collect();
         let flights = frames().filter(|f| self.is_flight(&high, *f));
         let checks = [
-            reported(&KEY_POINTS, "/keypoint_error_m/mean"),
-            reported(&AGREEMENT, "/contact_disagreement"),
+            keypoints.map(|error| KEY_POINTS.check(error, None)),
+            disagreement.map(|share| AGREEMENT.check(share, None)),
             SKATE.mean(speeds.iter().flat_map(|track| midst(track, self.fps))),
             SLIDE.most(slides(&speeds, self.fps)),
             PENETRATION.most(frames().map(|f| (f, depth(f).max(0.0)))),

@@ -140,7 +140,7 @@ mod tests {
                 contact: vec![vec![true, false], vec![false, false]],
                 root_wrench_residual: vec![Vector6::zeros(), pull],
             },
-            report: serde_json::Value::Null,
+            report: None,
         }
     }
 

@@ -20,7 +20,6 @@ fn draft(skeleton: &Skeleton, qpos: Vec<Vec<f64>>, fps: f64) -> Draft {
             .filter_map(|n| foot(n))
             .collect(),
         contact: None,
-        report: serde_json::json!({ "keypoint_error_m": 0.01 }),
     }
 }
 
@@ -271,11 +270,51 @@ fn short_touches_and_gaps_vanish() {
     );
 }
 
+fn report() -> RetargetReport {
+    let spread = Spread {
+        mean: 0.1,
+        max: 1.0 / 3.0,
+    };
+    RetargetReport {
+        frames: 20,
+        keypoint_error_m: spread,
+        foot_skate_m_s: 0.01,
+        penetration_m: Spread::default(),
+        float_m: 0.002,
+        contact_disagreement: Some(0.0625),
+        joint_limit_violations: 3,
+        map: vec![MappedJoint {
+            slot: crate::humanoid::Slot::LeftFoot,
+            joint: "mixamorig:LeftFoot".into(),
+            confidence: 0.9,
+            reason: "its name".into(),
+        }],
+        problems: Vec::new(),
+    }
+}
+
+/// What retargeting reports is judged, whatever the motion itself looks like.
+#[test]
+fn the_report_is_part_of_the_quality() {
+    let s = humanoid();
+    let mut motion = Motion::from_poses(&s, draft(&s, vec![s.rest_qpos(); 12], 30.0));
+    let ids = |motion: &Motion| -> Vec<(&str, f64)> {
+        let checks = motion.quality(&s).into_iter().map(|c| (c.id, c.value));
+        let of_report = ["keypoint-error", "contact-disagreement"];
+        checks.filter(|(id, _)| of_report.contains(id)).collect()
+    };
+    assert_eq!(ids(&motion), []);
+    motion.report = Some(report());
+    let expected = [("keypoint-error", 0.1), ("contact-disagreement", 0.0625)];
+    assert_eq!(ids(&motion), expected);
+}
+
 #[test]
 fn files_come_back_as_they_were() {
     let s = humanoid();
     let qvel: Vec<f64> = (0..s.nv).map(|i| (i as f64).sin()).collect();
-    let motion = Motion::from_poses(&s, draft(&s, steady(&s, &qvel, 20, 60.0), 60.0));
+    let mut motion = Motion::from_poses(&s, draft(&s, steady(&s, &qvel, 20, 60.0), 60.0));
+    motion.report = Some(report());
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("test.motion");
     motion.save(&path).expect("it can be written");
@@ -350,7 +389,6 @@ fn a_standing_character_passes_every_check() {
         qpos,
         contact_bodies: feet.to_vec(),
         contact: None,
-        report: serde_json::Value::Null,
     };
     let still = Motion::from_poses(&skeleton, draft(vec![qpos.clone(); 60]));
     let quality = still.quality(&skeleton);

@@ -30,11 +30,9 @@ mod swing;
 mod system;
 mod travel;
 
-pub use report::{MappedJoint, Report, Spread};
-
 use crate::clip::{Clip, LoopMode, MOST_FPS};
 use crate::humanoid::{self, HumanoidMap, Slot};
-use crate::motion::{Cycle, Draft, Motion};
+use crate::motion::{Cycle, Draft, Motion, RetargetReport};
 use crate::skeleton::{JointKind, Skeleton};
 use fit::{Fit, Fitted};
 use goals::Goals;
@@ -116,7 +114,7 @@ pub enum RetargetError {
 #[derive(Clone, Debug)]
 pub struct Retargeted {
     pub motion: Motion,
-    pub report: Report,
+    pub report: RetargetReport,
     /// Wall-clock time spent.
     pub seconds: f64,
     /// Steps of the trajectory solver.
@@ -186,7 +184,7 @@ pub fn retarget(
     });
     let map = report::mapped(clip, &map);
     let report = report::report(skeleton, &source, &measured, &motion, map, problems);
-    motion.report = serde_json::to_value(&report).unwrap_or_default();
+    motion.report = Some(report.clone());
     Ok(Retargeted {
         motion,
         report,
@@ -232,7 +230,6 @@ fn motion(
         qpos,
         contact: Some(stance::contact(model, anchors, &contact_bodies)),
         contact_bodies,
-        report: serde_json::Value::Null,
     };
     Motion::from_poses(model.skeleton, draft)
 }

@@ -3,65 +3,10 @@
 use super::reference::Reference;
 use super::source::Source;
 use crate::clip::{Clip, Problem, Severity};
-use crate::humanoid::{HumanoidMap, Slot};
-use crate::motion::{Motion, skate::sole_speed};
+use crate::humanoid::HumanoidMap;
+use crate::motion::{MappedJoint, Motion, RetargetReport, Spread, skate::sole_speed};
 use crate::skeleton::{Skeleton, limits};
 use nalgebra::Isometry3;
-use serde::{Deserialize, Serialize};
-
-/// Mean and greatest value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
-    pub mean: f64,
-    pub max: f64,
-}
-
-impl Spread {
-    fn of(values: impl Iterator<Item = f64>) -> Spread {
-        let (mut sum, mut max, mut count) = (0.0, 0.0_f64, 0_usize);
-        for value in values {
-            sum += value;
-            max = max.max(value);
-            count += 1;
-        }
-        Spread {
-            mean: sum / count.max(1) as f64,
-            max,
-        }
-    }
-}
-
-/// The joint used for a slot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MappedJoint {
-    pub slot: Slot,
-    pub joint: String,
-    pub confidence: f64,
-    pub reason: String,
-}
-
-/// What the retargeting of a clip achieved.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Report {
-    pub frames: usize,
-    /// Distance of hips, shoulders, elbows, wrists, knees and ankles from the source's, scaled limb by limb, metres.
-    pub keypoint_error_m: Spread,
-    /// Mean horizontal speed of feet and hands while the source's stand, each at the point on the ground that moves
-    /// least, m/s.
-    pub foot_skate_m_s: f64,
-    /// Depth of the lowest point below the ground, per frame, metres.
-    pub penetration_m: Spread,
-    /// Mean height above the ground of feet and hands while the source's stand, metres.
-    pub float_m: f64,
-    /// Share of the frames of every foot and hand, all taken together, in which it stands and the source's doesn't, or
-    /// the other way round.
-    #[serde(default)]
-    pub contact_disagreement: f64,
-    /// Coordinates outside of their limits, summed over frames.
-    pub joint_limit_violations: usize,
-    pub map: Vec<MappedJoint>,
-    pub problems: Vec<Problem>,
-}
 
 /// A foot or hand with what hangs on it, whether the source's touches the ground, and whether it stands still there,
 /// by frame.
@@ -79,16 +24,16 @@ pub(super) fn report(
     motion: &Motion,
     map: Vec<MappedJoint>,
     mut problems: Vec<Problem>,
-) -> Report {
+) -> RetargetReport {
     problems.extend(uncertain(&map));
     problems.extend(no_stance(contacts));
-    Report {
+    RetargetReport {
         frames: motion.qpos.len(),
         keypoint_error_m: keypoint_error(skeleton, source, &motion.bodies),
         foot_skate_m_s: foot_skate(skeleton, contacts, motion),
         penetration_m: penetration(skeleton, &motion.bodies),
         float_m: float(skeleton, contacts, motion),
-        contact_disagreement: disagreement(contacts, motion),
+        contact_disagreement: Some(disagreement(contacts, motion)),
         joint_limit_violations: motion
             .qpos
             .iter()

@@ -2,11 +2,14 @@
 
 usage: python mujoco_motion.py RANDOM.motion SKELETON.xml
 
+Reads RANDOM.json too, which the example writes beside the motion.
+
 Prints the largest deviation of every track relative to its size; exits 1 above 1e-4 (accelerations, which both sides
 get by differencing: 1e-2). Needs the packages mujoco, numpy and safetensors.
 """
 
 import json
+import pathlib
 import sys
 
 import mujoco
@@ -19,7 +22,9 @@ ACCELERATION_LIMIT = 1e-2
 
 def load(path):
     with safe_open(path, framework="numpy") as file:
-        return json.loads(file.metadata()["mimic"]), {k: file.get_tensor(k) for k in file.keys()}
+        header = json.loads(file.metadata()["mimic"])
+        header["beside"] = json.loads(pathlib.Path(path).with_suffix(".json").read_text())
+        return header, {k: file.get_tensor(k) for k in file.keys()}
 
 
 def relative(ours, theirs):
@@ -34,7 +39,7 @@ def differentiate(model, a, b, dt):
 
 
 def masses(model, header, ids):
-    ours = header["report"]["masses"]
+    ours = header["beside"]["masses"]
     inertia = []
     for b in ids:
         r = np.zeros(9)
@@ -107,7 +112,7 @@ def wrenches(model, header, t):
     return {
         "root force": relative(ours[inside, :3], force[inside]),
         "root moment": relative(ours[inside, 3:], moment[inside]),
-        "joint torques": relative(np.array(header["report"]["joint_torques"])[1:-1, 6:][inside], torques[inside]),
+        "joint torques": relative(np.array(header["beside"]["joint_torques"])[1:-1, 6:][inside], torques[inside]),
     }
 
 

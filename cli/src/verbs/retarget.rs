@@ -66,7 +66,7 @@ impl Args {
             "frames_per_second": frames as f64 / seconds.max(1e-9),
             "quality": quality,
         });
-        if let (Value::Object(report), Value::Object(found)) = (&mut report, motion.report) {
+        if let (Value::Object(report), Value::Object(found)) = (&mut report, json!(motion.report)) {
             report.extend(found);
         }
         printer.result(&report, || {

@@ -39,7 +39,7 @@ fn assert_walks(motion: &Motion, skeleton: &Skeleton) {
     assert!(motion.cycle.translation.x > 1.0 && motion.cycle.translation.y.abs() < 0.1);
 }
 
-fn assert_good(report: &Report, keypoints: f64, skate: f64) {
+fn assert_good(report: &RetargetReport, keypoints: f64, skate: f64) {
     assert!(
         report.keypoint_error_m.mean < keypoints,
         "{:?}",
