@@ -2,17 +2,24 @@
 
 use super::kernels::{AdamStep, MomentumStep, Scalar, adam, momentum_step};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Elements per piece of parallel work: fixed, so that sums don't depend on the number of threads.
 pub(crate) const PIECE: usize = 1 << 14;
 
 /// Kingma & Ba 2015, "Adam: a method for stochastic optimization", with their defaults.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdamConfig {
+    /// Decay of the running mean of the gradient, per step.
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1))]
     pub beta1: f64,
+    /// Decay of the running mean of the squared gradient, per step.
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1))]
     pub beta2: f64,
+    /// Added to the root of the squared gradient's mean, so that no division is by zero.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub epsilon: f64,
 }
 

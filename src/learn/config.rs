@@ -3,53 +3,79 @@
 use super::LearnError;
 use super::adam::AdamConfig;
 use super::surrogate::Objective;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How to learn. Left-out fields take the defaults.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Discount per control step.
+    /// Discount γ of later rewards, per control step.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub gamma: f64,
-    /// Decay of generalised advantage estimation.
+    /// λ of generalised advantage estimation: how slowly the weight of later steps decays.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub lambda: f64,
-    /// ε of the clipped ratio.
+    /// ε of the clipped objective: the ratio of new and old probability is clipped to 1 ± ε.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub clip: f64,
     /// Passes over a batch.
+    #[schemars(range(min = 1, max = 1000))]
     pub epochs: usize,
-    /// Samples per gradient step; a batch is cut into parts of nearly this size.
+    /// Samples per gradient step. A batch is cut into parts of nearly this size.
+    #[schemars(range(min = 1, max = 1_000_000_000))]
     pub minibatch: usize,
-    /// Parts of a minibatch whose gradients are computed side by side. Other numbers give other bits.
+    /// Parts of a minibatch whose gradients are computed side by side. Another number gives other bits.
+    #[schemars(range(min = 1, max = 1024))]
     pub shards: usize,
+    /// Weight of the critic's loss.
+    #[schemars(range(min = 0.0))]
     pub value_coefficient: f64,
+    /// Weight of the entropy of the action noise, which is rewarded.
+    #[schemars(range(min = 0.0))]
     pub entropy_coefficient: f64,
     /// Mean actions beyond ± this are penalised.
+    #[schemars(range(min = 0.0))]
     pub action_bound: f64,
-    /// Times the squared excess; 0 switches the penalty off.
+    /// Weight of that penalty, times the square of the excess. 0 switches it off.
+    #[schemars(range(min = 0.0))]
     pub action_bound_coefficient: f64,
-    /// Euclidean norm that gradients are clipped to.
+    /// Largest Euclidean norm of a gradient; a longer one is scaled down to it.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gradient_norm: f64,
     /// Learning rate at the start.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub learning_rate: f64,
+    /// Smallest learning rate that `target_kl` may set.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_learning_rate: f64,
+    /// Largest learning rate that `target_kl` may set: at least `min_learning_rate`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_learning_rate: f64,
-    /// KL divergence per update that steers the learning rate: × 1.5 below half of it, ÷ 1.5 above twice of it.
-    /// `null` keeps the learning rate and never stops early.
+    /// KL divergence per update that steers the learning rate: it grows by 1.5 below half of this, and shrinks by 1.5 above twice
+    /// of it. `null` keeps the learning rate and never ends an update early.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub target_kl: Option<f64>,
-    /// An update stops before the step of a minibatch whose KL exceeds this many times the target.
+    /// An update ends before the step of a minibatch whose KL divergence exceeds this many times `target_kl`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub stop_kl_factor: f64,
     /// Standard deviation of the action noise at the start.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub initial_std: f64,
-    /// Whether the noise is learned; otherwise it stays.
+    /// Whether the standard deviation of the noise is learned. Otherwise `final_std` alone changes it.
     pub learn_std: bool,
-    /// Whether the critic learns returns on a running scale (see [`super::Learner`]).
+    /// Whether the critic learns returns on a running scale.
     pub normalize_returns: bool,
-    /// Normalised advantages are cut off beyond ± this; `null` keeps them all.
+    /// Normalised advantages are limited to ± this. `null` sets no limit.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub advantage_limit: Option<f64>,
-    /// Learning rate of the critic at the start; `null` gives it the actor's.
+    /// Learning rate of the critic at the start. `null` gives it the actor's.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub critic_learning_rate: Option<f64>,
-    /// Gradient descent with this momentum instead of Adam; `null` is Adam.
+    /// Momentum of plain gradient descent, which then replaces Adam. `null` is Adam.
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1))]
     pub momentum: Option<f64>,
+    /// Settings of Adam, the optimiser.
     pub adam: AdamConfig,
 }
 

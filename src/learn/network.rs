@@ -3,16 +3,20 @@
 use super::kernels::{Matrix, Scalar, activation_backward, bias_and_activate, multiply, sum_rows};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// What follows every hidden layer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Activation {
+    /// max(0, x).
     #[default]
     Relu,
+    /// x above 0, exp(x) − 1 below.
     Elu,
+    /// Hyperbolic tangent.
     Tanh,
 }
 

@@ -2,35 +2,44 @@
 
 use super::{Activation, Config, LearnError};
 use crate::task::{Setting, TaskError};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Everything that decides what a run learns. The number of threads does not.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Plan {
+    /// Decides all random numbers. On one kind of processor, the same seed gives the same bits.
     pub seed: u64,
     pub task: Setting,
     pub ppo: Config,
-    /// Widths of the hidden layers of actor and critic.
+    /// Widths of the hidden layers of actor and critic, up to 16 of them.
+    #[schemars(inner(range(min = 1, max = 65536)))]
     pub hidden: Vec<usize>,
-    /// What follows every hidden layer.
+    /// Activation after every hidden layer.
     pub activation: Activation,
     /// Environments that act side by side.
+    #[schemars(range(min = 1))]
     pub environments: usize,
-    /// Environments that share a network call and physics steps: a multiple of [`LANES`](crate::sim::LANES) leaves no lane
-    /// idle.
+    /// Environments that share a network call and physics steps. A multiple of 8 leaves no lane idle.
+    #[schemars(range(min = 1))]
     pub group: usize,
-    /// Control steps of each environment in an iteration.
+    /// Control steps of each environment in an iteration, which is one batch.
+    #[schemars(range(min = 1))]
     pub horizon: usize,
-    /// Iterations after which all episodes begin anew. Between rounds no episode is under way, so that is
-    /// where a run can be stopped and resumed to the same bits.
+    /// Iterations after which all episodes begin anew. No episode is under way then, so that is where a run can be stopped and
+    /// resumed to the same bits.
+    #[schemars(range(min = 1))]
     pub round: u64,
-    /// Samples after which training ends.
+    /// Samples (control steps of one environment) after which training ends.
+    #[schemars(range(min = 1))]
     pub samples: u64,
-    /// Action noise at the end, as a share of that at the start; it shrinks evenly over the samples.
+    /// Action noise at the end, as a share of that at the start. It changes evenly over the samples.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub final_std: f64,
-    /// Learning rate at the end, as a share of that at the start, where no KL steers it; it changes evenly over the
-    /// samples.
+    /// Learning rate at the end, as a share of that at the start, where `ppo.target_kl` doesn't steer it. It changes evenly over
+    /// the samples.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub final_learning_rate: f64,
 }
 

@@ -264,12 +264,12 @@ mod tests {
 
     #[test]
     fn the_documentation_has_every_value() {
-        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/presets.md");
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/settings.md");
         let text = std::fs::read_to_string(file).expect("the page is there");
         let table = table();
         assert!(
             text.contains(&table),
-            "docs/presets.md should have\n\n{table}"
+            "docs/settings.md should have\n\n{table}"
         );
     }
 

@@ -1,9 +1,10 @@
 //! What physics is set to: which engine, at which rates.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The engine that moves a character.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Engine {
     /// Our own engine: reduced coordinates, drives that are stable at any stiffness.
@@ -14,19 +15,23 @@ pub enum Engine {
 }
 
 /// Rates and solver settings of the physics.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Control steps per second, Hz: how often the policy acts. Default 30.
+    /// Control steps per second: how often the policy acts.
+    #[schemars(range(min = 1.0, max = 1e4), extend("x-unit" = "Hz"))]
     pub control_hz: f64,
-    /// Physics steps per control step. Default 2.
+    /// Physics steps per control step.
+    #[schemars(range(min = 1, max = 1000))]
     pub steps_per_control: u32,
-    /// Substeps per physics step, each of which integrates joints, drives and contacts. Default 4.
+    /// Substeps per physics step, each of which integrates joints, drives and contacts.
+    #[schemars(range(min = 1, max = 1000))]
     pub substeps: u32,
-    /// Time constant with which the ground gives way under a contact, seconds, as in MuJoCo's `solref`, whose default is
-    /// 0.02. Default 0: the ground is hard. The rapier engine ignores it and uses its own contact model.
+    /// Time constant with which the ground gives way under a contact, as in MuJoCo's `solref`, where 0.02 s is usual. At 0 the
+    /// ground is hard. The rapier engine ignores this and uses its own contact model.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "s"))]
     pub contact_s: f64,
-    /// The engine that moves the character. Default `articulated`.
+    /// The engine that moves the character.
     pub engine: Engine,
 }
 

@@ -4,25 +4,42 @@ use super::setting::TaskError;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 
 /// What disturbs episodes: ranges, least and most, that every one draws from, and whether its reference then follows. By
 /// default nothing is disturbed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Perturbations {
-    /// Horizontal shove on the trunk, any way: what it changes the velocity of the whole character by, m/s. Its impulse is
-    /// that times the character's weight.
+    /// Size of a horizontal shove on the trunk, in any direction: by how much it changes the velocity of the whole character.
+    /// The impulse is this times the character's mass.
+    #[schemars(
+        inner(range(min = 0.0, max = 100.0)),
+        extend("x-ascending" = true, "x-unit" = "m/s")
+    )]
     pub push_m_s: [f32; 2],
-    /// From one shove to the next, and from the start to the first, seconds.
+    /// Time from the start to the first shove, and from each shove to the next.
+    #[schemars(
+        inner(range(min = 0.05, max = 100.0)),
+        extend("x-ascending" = true, "x-unit" = "s")
+    )]
     pub push_interval_s: [f32; 2],
-    /// All masses and inertias times this.
+    /// Factor on all masses and inertias.
+    #[schemars(
+        inner(range(min = 0.05, max = 100.0)),
+        extend("x-ascending" = true)
+    )]
     pub mass: [f32; 2],
-    /// Friction times this.
+    /// Factor on the friction with the ground.
+    #[schemars(
+        inner(range(min = 0.0, max = 100.0)),
+        extend("x-ascending" = true)
+    )]
     pub friction: [f32; 2],
-    /// Whether the reference, from the first shove on, follows the agent along the ground: nothing asks who was shoved out
-    /// of its way to come back to it.
+    /// Whether the reference follows the agent along the ground from the first shove on, so that an agent that was shoved
+    /// aside isn't asked to come back. Evaluations always do so.
     pub follow: bool,
 }
 

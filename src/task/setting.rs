@@ -4,19 +4,35 @@ use super::perturb::Perturbations;
 use super::reward::{Kernels, TERM_NAMES};
 use crate::motion::MotionError;
 use crate::sim::{Settings, SimError};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the network's output means.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Actions {
-    /// Rotation added to the reference's own joint targets, `scale` radians for an output of one.
-    Residual { scale: f32 },
-    /// Exponential-map target itself: the middle of each coordinate's range for zero, its ends times `reach` for ±1.
-    /// A hinge is aimed at most half a radian beyond its range.
-    Absolute { reach: f32 },
-    /// The same with the rest pose for zero, and `reach` times the further end of each coordinate's range for ±1.
-    FromRest { reach: f32 },
+    /// The output is a rotation that is added to the reference's own joint targets.
+    Residual {
+        /// Rotation for an output of 1.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "rad"))]
+        scale: f32,
+    },
+    /// The output is the target itself, as an exponential map: 0 is the middle of each coordinate's range. A hinge is aimed at
+    /// most half a radian beyond its range.
+    Absolute {
+        /// Target for an output of ±1, as a share of the way from the target for 0 to the end of the range; under `from-rest` to
+        /// the farther end.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
+        reach: f32,
+    },
+    /// The output is the target itself, as an exponential map: 0 is the rest pose. A hinge is aimed at most half a radian
+    /// beyond its range.
+    FromRest {
+        /// Target for an output of ±1, as a share of the way from the target for 0 to the end of the range; under `from-rest` to
+        /// the farther end.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
+        reach: f32,
+    },
 }
 
 impl Actions {
@@ -29,13 +45,14 @@ impl Actions {
 }
 
 /// What the policy sees; see [`super::layout`] for the blocks of each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Observations {
     /// Our own: the agent, its errors against the reference, and the phase, in the root's frame.
     #[default]
     Tracking,
-    /// The same, and where the reference is going: its root, joints and contacts 0.1 and 0.3 s after the next control step.
+    /// As `tracking`, and where the reference is going: its root, joints and contacts 0.1 and 0.3 s after the next control
+    /// step.
     TrackingAhead,
     /// Peng et al. 2018, "DeepMimic", section 4: all bodies in the heading frame, and the phase.
     Deepmimic,
@@ -54,20 +71,40 @@ impl Observations {
 }
 
 /// Weights of the reward terms; what a step earns is divided by their sum. See [`super::Terms`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rewards {
     /// Which errors the terms are made of.
     pub kernels: Kernels,
+    /// Weight of the error of the joints' rotations.
+    #[schemars(range(min = 0.0))]
     pub pose: f32,
+    /// Weight of the error of the joints' or bodies' angular velocities.
+    #[schemars(range(min = 0.0))]
     pub velocity: f32,
+    /// Weight of the error of the bodies' positions relative to the root.
+    #[schemars(range(min = 0.0))]
     pub position: f32,
+    /// Weight of the error of the root's position and rotation.
+    #[schemars(range(min = 0.0))]
     pub root: f32,
+    /// Weight of the error of the root's linear and angular velocity.
+    #[schemars(range(min = 0.0))]
     pub root_velocity: f32,
+    /// Weight of the error of the centre of mass's velocity.
+    #[schemars(range(min = 0.0))]
     pub com: f32,
+    /// Weight of the error of the angular momentum about the centre of mass.
+    #[schemars(range(min = 0.0))]
     pub angular_momentum: f32,
+    /// Weight of the error of the positions of hands and feet.
+    #[schemars(range(min = 0.0))]
     pub end_effector: f32,
+    /// Weight of the error of the velocities of hands and feet.
+    #[schemars(range(min = 0.0))]
     pub end_effector_velocity: f32,
+    /// Weight of the error of the centre of mass's position.
+    #[schemars(range(min = 0.0))]
     pub com_position: f32,
 }
 
@@ -124,14 +161,16 @@ impl Default for Rewards {
 }
 
 /// When an episode fails.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Terminations {
-    /// A body further than this from its reference, metres; `None` leaves the rule out.
+    /// An episode fails when any body is farther than this from its reference. `null` leaves the rule out.
+    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "m"))]
     pub distance: Option<f32>,
-    /// A body that the reference never puts on the ground touches it.
+    /// An episode fails when a body touches the ground that the reference never puts there.
     pub fall: bool,
-    /// Reward of a step below this, as in the paper; `None` leaves the rule out.
+    /// An episode fails when the reward of a step is below this, as in Booth & Ivanov 2020. `null` leaves the rule out.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub reward: Option<f32>,
 }
 
@@ -146,28 +185,39 @@ impl Default for Terminations {
 }
 
 /// Everything that a task can be told.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Setting {
+    /// Rates and solver settings of the physics.
     pub physics: Settings,
+    /// What the policy's output means.
     pub actions: Actions,
+    /// What the policy sees.
     pub observations: Observations,
+    /// What the policy is rewarded for.
     pub rewards: Rewards,
+    /// When an episode fails.
     pub terminations: Terminations,
-    /// What disturbs training.
+    /// What disturbs the episodes of training.
     pub perturbations: Perturbations,
-    /// Start at any phase (reference state initialisation), not only at the first frame.
+    /// Whether episodes begin at any phase (reference state initialisation) instead of at the first frame alone.
     pub start_anywhere: bool,
     /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
     /// [`Setting::start_anywhere`].
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub adaptive_starts: f64,
-    /// Seconds after which an episode goes over into another motion of the run, which follows the agent along the ground, and
-    /// after which into the next: least and most. `None` keeps it to one.
+    /// Time from the start of an episode to its first transition into another motion of the run, and from each to the next: the
+    /// least and the most. `null` keeps an episode to one motion.
+    #[schemars(
+        inner(range(min = 0.1, max = 1e6)),
+        extend("x-ascending" = true, "x-unit" = "s")
+    )]
     pub transitions_s: Option<[f64; 2]>,
-    /// Whether every cycle of a motion that repeats begins where the agent's root is along the ground, so that nothing asks
-    /// it to catch up; else the motion goes its own way, until a shove or another motion that led into it.
+    /// Whether each cycle of a looping motion begins where the agent's root is along the ground, so that the agent never has to
+    /// catch up. Otherwise the motion goes its own way, until a shove or a transition moves it.
     pub cycles_follow: bool,
-    /// Longest episode in training, seconds.
+    /// Longest episode in training.
+    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "s"))]
     pub episode_s: f64,
 }
 

@@ -13,6 +13,7 @@ use super::setting::Rewards;
 use super::stage::Stage;
 use crate::sim::LinkState;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Names of the terms, in the order of [`Terms::values`].
@@ -30,7 +31,7 @@ pub const TERM_NAMES: [&str; 10] = [
 ];
 
 /// Which errors the terms are made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kernels {
     /// Our own: means over links, so that no scale depends on how many there are.
@@ -38,9 +39,9 @@ pub enum Kernels {
     Tracking,
     /// Peng et al. 2018, "DeepMimic", section 5.1: sums over joints.
     Deepmimic,
-    /// The same as its published program has it: sums over weighted joints, and a term for the root.
+    /// The program published with that paper: sums over weighted joints, and a term for the root.
     DeepmimicProgram,
-    /// Booth & Ivanov 2020 as its published program has it: sums over bodies.
+    /// The program published with Booth & Ivanov 2020: sums over bodies.
     Booth2020,
 }
 
