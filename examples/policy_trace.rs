@@ -1,5 +1,5 @@
-//! Writes what a run's policy sees and does, step by step, for `tests/outside/mujoco_policy.py` to check the example
-//! `mujoco_policy.py` against.
+//! Writes what a run's policy sees and does, step by step. `tests/outside/mujoco_policy.py` checks the example
+//! `mujoco_policy.py` against it.
 //!
 //! `cargo run --release --example policy_trace RUN STEPS > TRACE.json`
 
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Time, and of every body its position, rotation (scalar first), velocity of its origin and angular velocity.
+/// Time, contacts, and for every body its position, rotation (scalar first), and linear and angular velocity, in world axes.
 fn state(stage: &Stage, env: &Imitate) -> Value {
     let (mut position, mut rotation, mut linear, mut angular) = (vec![], vec![], vec![], vec![]);
     for body in 0..stage.character.bodies.len() {

@@ -1,4 +1,4 @@
-//! Writes what one PPO update reads and makes, in f64 and f32, for `tests/outside/ppo_update.py` to compute again.
+//! Writes the inputs and results of one PPO update, in f64 and f32. `tests/outside/ppo_update.py` computes it again in JAX.
 //!
 //! `cargo run --release --example ppo_update -- FOLDER` writes `f64.safetensors` and `f32.safetensors`.
 

@@ -1,5 +1,5 @@
-//! Writes a smooth made-up motion of a skeleton, and beside it as JSON the masses of its bodies and the torques of its joints,
-//! for `tests/outside/mujoco_motion.py` to check against MuJoCo.
+//! Writes a smooth random motion of a skeleton, and beside it, as JSON, the masses of its bodies and the torques of its
+//! joints. `tests/outside/mujoco_motion.py` checks both against MuJoCo.
 //!
 //! `cargo run --release --example random_motion OUT.motion [SKELETON]`
 
@@ -57,7 +57,7 @@ fn masses(skeleton: &Skeleton) -> Vec<serde_json::Value> {
     skeleton.bodies.iter().map(row).collect()
 }
 
-/// One degree of freedom: two sines.
+/// Movement of one degree of freedom: the sum of two sines. Amplitudes are in rad or m, frequencies in Hz.
 struct Wave {
     amplitude: [f64; 2],
     frequency: [f64; 2],
@@ -72,6 +72,7 @@ impl Wave {
     }
 }
 
+/// Random waves, slow and small enough to stay within what joints do (chosen).
 fn waves(count: usize, random: &mut ChaCha8Rng) -> Vec<Wave> {
     let mut uniform = |low: f64, high: f64| {
         let unit = f64::from(random.next_u32()) / f64::from(u32::MAX);

@@ -1,7 +1,10 @@
-//! Simulates a character whose drives hold a pose, for `tests/outside/mujoco_simulation.py` to do the same.
+//! Simulates a character whose drives hold a pose. `tests/outside/mujoco_simulation.py` lets MuJoCo do the same and compares.
 //!
-//! `cargo run --release --example simulation_trace START.json SKELETON HZ CONTACT_S > TRACE.json`, where START holds `qpos`, `qvel`,
-//! `control` and `steps` of 1/30 s, HZ is the rate of physics and CONTACT_S the seconds in which the ground yields. Prints positions of all bodies after every step.
+//! `cargo run --release --example simulation_trace START.json SKELETON HZ CONTACT_S > TRACE.json`
+//!
+//! START.json holds `qpos`, `qvel`, the drives' targets `control`, and the number of control steps `steps`, 1/30 s each. HZ is
+//! the rate of physics, CONTACT_S the time constant with which the ground gives way. It prints the positions of all bodies
+//! after every control step.
 
 use mimic::sim::{Character, Link, LinkJoint, LinkState, Settings, Target, World};
 use mimic::skeleton::Skeleton;
@@ -35,6 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Where all links start.
 fn states(
     skeleton: &Skeleton,
     character: &Character,
@@ -45,7 +49,7 @@ fn states(
     Ok(character.states(skeleton, &qpos, &qvel))
 }
 
-/// A hinge's angle, a ball's rotation vector, of all drives in their order. Several hinges of one body are held at rest.
+/// Targets of all links from the drive coordinates: angles of hinges and rotation vectors of balls, in the order of drives.
 fn targets(character: &Character, control: &[f32]) -> Vec<Target> {
     let turn = |v: &[f32]| UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(v));
     let target = |link: &Link| {
@@ -54,13 +58,14 @@ fn targets(character: &Character, control: &[f32]) -> Vec<Target> {
             LinkJoint::Free => Target::Free,
             LinkJoint::Hinge { .. } => Target::Hinge(own[0]),
             LinkJoint::Ball { .. } => Target::Ball(turn(own)),
-            // Held where they are at rest.
+            // Several hinges of one body hold their rest pose.
             LinkJoint::Hinges { .. } => Target::Ball(UnitQuaternion::identity()),
         }
     };
     character.links.iter().map(target).collect()
 }
 
+/// Position of every body, world frame, metres.
 fn positions(character: &Character, states: &[LinkState]) -> Vec<Vec<f32>> {
     let position = |body| {
         let pose = character.body_pose(states, body);

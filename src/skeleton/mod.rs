@@ -4,6 +4,17 @@
 //! A free joint has a position (3) and a quaternion w, x, y, z (4); its velocity is linear in world axes (3) and angular in
 //! the body's own axes (3). A ball joint has a quaternion, and its velocity is in the child's axes. Several hinges on one
 //! body turn it one after the other.
+//!
+//! ```
+//! use mimic::humanoid::Slot;
+//! use mimic::skeleton::Skeleton;
+//!
+//! let skeleton = Skeleton::load("humanoid")?;
+//! let poses = skeleton.forward(&skeleton.rest_qpos());
+//! let head = poses[skeleton.slots[&Slot::Head]];
+//! assert!(head.translation.z > skeleton.leg_length(), "the head is above the legs");
+//! # Ok::<(), mimic::skeleton::SkeletonError>(())
+//! ```
 
 mod coordinates;
 mod drive;

@@ -5,7 +5,7 @@ use super::setting::TaskError;
 use crate::humanoid::Slot;
 use crate::sim::{Character, Link};
 use crate::skeleton::{GRAVITY, Shape, Skeleton};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// Points this little above the lowest one are of the sole, metres.
 const SOLE: f64 = 0.01;
@@ -92,7 +92,8 @@ fn soles(skeleton: &Skeleton, character: &Character) -> Vec<SolePoint> {
 
 /// The points of a link's sole that are furthest back, front and left, front and right in the rest pose.
 fn sole(index: usize, link: &Link, upright: &UnitQuaternion<f64>) -> Vec<SolePoint> {
-    let points: Vec<_> = link.shapes.iter().flat_map(ends).collect();
+    let balls = link.shapes.iter().flat_map(Shape::hull_balls);
+    let points: Vec<_> = balls.map(|(at, radius)| (at.coords, radius)).collect();
     let height = |(p, radius): &(Vector3<f64>, f64)| (upright * p).z - radius;
     let lowest = points.iter().map(height).fold(f64::INFINITY, f64::min);
     let low = || points.iter().filter(|p| height(p) < lowest + SOLE);
@@ -108,22 +109,4 @@ fn sole(index: usize, link: &Link, upright: &UnitQuaternion<f64>) -> Vec<SolePoi
             radius: *radius as f32,
         })
         .collect()
-}
-
-/// Balls that a shape is the hull of; a box's are its corners, of radius 0.
-fn ends(shape: &Shape) -> Vec<(Vector3<f64>, f64)> {
-    match shape {
-        Shape::Sphere { center, radius } => vec![(*center, *radius)],
-        Shape::Capsule { a, b, radius } => vec![(*a, *radius), (*b, *radius)],
-        Shape::Box { pose, half } => (0..8)
-            .map(|corner: u32| {
-                let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
-                let signs = Vector3::new(sign(0), sign(1), sign(2));
-                (
-                    (pose * Point3::from(half.component_mul(&signs))).coords,
-                    0.0,
-                )
-            })
-            .collect(),
-    }
 }
