@@ -1,104 +1,240 @@
-//! The trajectory: fitted to its goals, with flights that follow gravity and spin freely, inside the joint limits.
+//! Stage 6, fit: one trajectory of the skeleton is fitted to its goals, with flights that fall and spin freely, inside the joint limits
+//! and above the ground.
+//!
+//! Flights can be told only from a trajectory that is nearly right, so the fit goes in steps, each from the result of the one before:
+//! a first fit to the goals; flights shifted onto their parabolas, with the frames that lead to them solved again; flights turned to spin
+//! freely, likewise; frames that break a limit solved again more stiffly; and flights put back onto the paths that fitting moved them off.
 
-use super::cost::{self, Problem};
-use super::flight::{self, Air, Flight, Lift};
+mod ballistic;
+mod banded;
+mod cost;
+mod flight;
+mod smoothness;
+mod solver;
+mod span;
+mod spin;
+mod system;
+mod torque_free;
+mod trajectory;
+mod weight;
+mod window;
+
+use super::anchor::Anchor;
 use super::goals::Goals;
 use super::model::Model;
-use super::rotation;
-use super::solve::{self, Solver};
-use super::spin::{self, Tilt, Tilts};
-use super::stance::Anchor;
+use super::qpos::CycleStep;
+use crate::clip::Problem;
 use crate::motion::Cycle;
 use crate::skeleton::limits;
-use nalgebra::Vector3;
+use ballistic::FlightShift;
+use cost::LeastSquares;
+use solver::Solver;
+use span::Flight;
+use spin::FlightTurn;
+use trajectory::Trajectory;
 
-/// Depth below the ground from which on a frame is solved again, metres.
+/// Depth below the ground from which on a frame is solved again, metres. Chosen below the 1 cm that is asked of a motion.
 const DEEPEST: f64 = 0.004;
 
 /// What a trajectory is fitted with, beside its goals.
 #[derive(Clone, Copy)]
 pub(super) struct Fit<'a> {
+    /// The skeleton.
     pub model: &'a Model<'a>,
+    /// The points that stand, by frame.
     pub anchors: &'a [Vec<Anchor>],
+    /// For a motion that repeats.
     pub cycle: Option<&'a Cycle>,
+    /// Frames per second.
     pub fps: f64,
     /// As in [`super::Options`].
     pub to_perform: bool,
 }
 
-/// A trajectory, and what became of it.
+/// A fitted trajectory.
 pub(super) struct Fitted {
+    /// Coordinates of every frame; the last one of a cycle is the first, carried on.
     pub frames: Vec<Vec<f64>>,
-    /// Steps of the first fit.
+    /// Most steps that a window took in the first fit.
     pub iterations: usize,
-    /// How far a flight was moved at most, metres.
-    pub lifted: f64,
-    /// How far a flight was turned at most, radians.
-    pub turned: f64,
-    /// Whether all flights keep their angular momentum.
-    pub spins_freely: bool,
+    /// The notes `flight-corrected` and `spin-corrected`.
+    pub problems: Vec<Problem>,
+}
+
+/// Goals and a trajectory on the way to fit them.
+struct Fitting {
+    goals: Goals,
+    frames: Vec<Vec<f64>>,
 }
 
 impl<'a> Fit<'a> {
-    pub fn run(&self, goals: &mut Goals) -> Fitted {
+    /// Fits a trajectory to the goals.
+    pub fn run(&self, goals: Goals) -> Fitted {
+        let (fitting, iterations) = self.first(goals);
+        let (flights, shifts) = flight::find(&self.trajectory(&fitting.frames));
+        let (frames, problems) = match flights.is_empty() {
+            true => (
+                self.within_limits(&fitting.goals, fitting.frames),
+                Vec::new(),
+            ),
+            false => self.with_flights(fitting, &flights, &shifts),
+        };
+        Fitted {
+            frames: self.whole_cycle(frames),
+            iterations,
+            problems,
+        }
+    }
+
+    /// The first fit, from the guess. Returns the steps that it took as well.
+    fn first(&self, goals: Goals) -> (Fitting, usize) {
         let mut frames = goals.guess.clone();
+        // The last frame of a cycle is the first of the next, and isn't solved for twice.
         if self.cycle.is_some() {
             frames.pop();
         }
-        let iterations = self.solver(&self.problem(goals)).run(&mut frames);
-        let (flights, lifts) = self.air(&frames).lifts();
-        let mut tilts = Tilts {
-            frames: Vec::new(),
-            free: Vec::new(),
-        };
-        if !flights.is_empty() {
-            self.lift(goals, &lifts, &mut frames);
-            tilts = spin::tilts(&self.air(&frames), &flights);
-            self.tilt(goals, &tilts.frames, &mut frames);
-        }
-        let problem = self.problem(goals);
-        self.mend(&problem, &mut frames);
-        if !flights.is_empty() {
-            self.set_free(&flights, &tilts.free, &mut frames);
-            // A flight that was freed may touch what it flew past.
-            self.mend(&problem, &mut frames);
-        }
-        if let (Some(cycle), Some(first)) = (self.cycle, frames.first()) {
-            let turn = rotation::exp(&(Vector3::z() * cycle.heading)).to_rotation_matrix();
-            let last = solve::carried(first, turn.matrix(), &cycle.translation);
-            frames.push(last);
-        }
-        let flying = lifts.iter().flatten().filter(|lift| lift.flies);
-        let turned = tilts.frames.iter().flatten().filter(|tilt| tilt.flies);
-        let turned = turned.map(|tilt| tilt.by.angle());
-        Fitted {
-            frames,
-            iterations,
-            lifted: flying.map(|lift| lift.shift.norm()).fold(0.0, f64::max),
-            turned: turned.fold(0.0, f64::max),
-            spins_freely: tilts.free.len() == flights.len(),
-        }
+        let iterations = self.solver(&self.least_squares(&goals)).run(&mut frames);
+        (Fitting { goals, frames }, iterations)
     }
 
-    fn problem<'g>(&self, goals: &'g Goals) -> Problem<'g>
+    /// Makes flights fall and spin freely, and brings all frames inside their limits.
+    fn with_flights(
+        &self,
+        fitting: Fitting,
+        flights: &[Flight],
+        shifts: &[Option<FlightShift>],
+    ) -> (Vec<Vec<f64>>, Vec<Problem>) {
+        let fallen = self.shifted(fitting, shifts);
+        let turns = spin::turns(&self.trajectory(&fallen.frames), flights);
+        let Fitting { goals, frames } = self.turned(fallen, &turns.frames);
+        let frames = self.within_limits(&goals, frames);
+        let frames = self.put_back(frames, flights, &turns.free);
+        // A flight that was put back may touch what it flew past.
+        let frames = self.within_limits(&goals, frames);
+        let all_free = turns.free.len() == flights.len();
+        let problems = [
+            ballistic::problem(farthest_shift(shifts)),
+            spin::problem(farthest_turn(&turns.frames), all_free),
+        ];
+        (frames, problems.into_iter().flatten().collect())
+    }
+
+    /// Shifts flights onto their parabolas, and solves for them and for what leads to them again.
+    fn shifted(&self, fitting: Fitting, shifts: &[Option<FlightShift>]) -> Fitting {
+        let Fitting {
+            mut goals,
+            mut frames,
+        } = fitting;
+        for (f, shift) in shifts.iter().enumerate() {
+            let Some(shift) = shift else { continue };
+            let anchors = self.trajectory(&frames).stood_on(f);
+            ballistic::shift_goals(self.model, &mut goals, f, &anchors, shift);
+            shift.apply(&mut frames[f]);
+        }
+        self.solver(&self.least_squares(&goals))
+            .repair(&mut frames, |f, _| shifts[f].is_some());
+        Fitting { goals, frames }
+    }
+
+    /// Turns flights so that they spin freely, and solves for what leads to them again.
+    fn turned(&self, fitting: Fitting, turns: &[Option<FlightTurn>]) -> Fitting {
+        let Fitting {
+            mut goals,
+            mut frames,
+        } = fitting;
+        for (f, turn) in turns.iter().enumerate() {
+            let Some(turn) = turn else { continue };
+            let anchors = self.trajectory(&frames).stood_on(f);
+            spin::turn_goals(self.model, &mut goals, f, &anchors, (&frames[f], turn));
+            turn.apply(self.model.skeleton, &mut frames[f]);
+        }
+        // What flies was turned with its goals, and fits them as before.
+        let leads = |f: usize, _: &[f64]| turns[f].is_some_and(|turn| !turn.flies);
+        self.solver(&self.least_squares(&goals))
+            .repair(&mut frames, leads);
+        Fitting { goals, frames }
+    }
+
+    /// Puts flights back onto their parabolas, and those of `spin` back to one angular momentum. Fitting has moved them off by little,
+    /// so what flies is moved as it is, and what leads to it stays.
+    fn put_back(
+        &self,
+        mut frames: Vec<Vec<f64>>,
+        flights: &[Flight],
+        spin: &[Flight],
+    ) -> Vec<Vec<f64>> {
+        let shifts = ballistic::shifts(&self.trajectory(&frames), flights);
+        for (qpos, shift) in frames.iter_mut().zip(shifts) {
+            if let Some(shift) = shift.filter(|shift| shift.flies) {
+                shift.apply(qpos);
+            }
+        }
+        let turns = spin::turns(&self.trajectory(&frames), spin).frames;
+        for (qpos, turn) in frames.iter_mut().zip(turns) {
+            if let Some(turn) = turn.filter(|turn| turn.flies) {
+                turn.apply(self.model.skeleton, qpos);
+            }
+        }
+        frames
+    }
+
+    /// Solves again, more and more stiffly, where a coordinate is outside of its limits or a body below the ground, and clamps what is
+    /// left. Clamping moves feet, so it should have nothing left to do.
+    fn within_limits(&self, goals: &Goals, mut frames: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let skeleton = self.model.skeleton;
+        let is_wrong = |_: usize, qpos: &[f64]| {
+            limits::violations(skeleton, qpos) > 0
+                || skeleton.lowest_point(&skeleton.forward(qpos)) < -DEEPEST
+        };
+        let stiffer = weight::STIFF_LIMITS.into_iter();
+        for (limit, ground) in stiffer.zip(weight::STIFF_GROUND) {
+            if !frames.iter().any(|qpos| is_wrong(0, qpos)) {
+                break;
+            }
+            let stiff = LeastSquares {
+                limit,
+                ground,
+                ..self.least_squares(goals)
+            };
+            self.solver(&stiff).repair(&mut frames, is_wrong);
+        }
+        for qpos in &mut frames {
+            limits::clamp(skeleton, qpos);
+        }
+        frames
+    }
+
+    /// Appends the last frame of a cycle, which is the first, carried on.
+    fn whole_cycle(&self, mut frames: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        if let (Some(cycle), Some(first)) = (self.cycle, frames.first()) {
+            let last = CycleStep::of(cycle).carry(first);
+            frames.push(last);
+        }
+        frames
+    }
+
+    /// The least-squares problem of these goals.
+    fn least_squares<'g>(&self, goals: &'g Goals) -> LeastSquares<'g>
     where
         'a: 'g,
     {
-        Problem::new(self.model, goals, self.anchors, self.fps)
+        LeastSquares::new(self.model, goals, self.anchors, self.fps)
     }
 
-    fn solver<'p>(&self, problem: &'p Problem<'p>) -> Solver<'p>
+    /// A solver for it.
+    fn solver<'p>(&self, problem: &'p LeastSquares<'p>) -> Solver<'p>
     where
         'a: 'p,
     {
         Solver::new(problem, self.cycle)
     }
 
-    fn air<'f>(&self, frames: &'f [Vec<f64>]) -> Air<'f>
+    /// These frames with what stands in them.
+    fn trajectory<'f>(&self, frames: &'f [Vec<f64>]) -> Trajectory<'f>
     where
         'a: 'f,
     {
-        Air {
+        Trajectory {
             model: self.model,
             frames,
             anchors: self.anchors,
@@ -107,72 +243,19 @@ impl<'a> Fit<'a> {
             to_perform: self.to_perform,
         }
     }
-
-    /// Moves flights onto their parabolas, with what leads to them.
-    fn lift(&self, goals: &mut Goals, lifts: &[Option<Lift>], frames: &mut [Vec<f64>]) {
-        for (f, lift) in lifts.iter().enumerate() {
-            let Some(lift) = lift else { continue };
-            flight::lift(self.model, goals, f, &self.air(frames).stood_on(f), lift);
-            lift.apply(&mut frames[f]);
-        }
-        let problem = self.problem(goals);
-        self.solver(&problem)
-            .mend(frames, |f, _| lifts[f].is_some());
-    }
-
-    /// Turns flights so that they spin freely, with what leads to them.
-    fn tilt(&self, goals: &mut Goals, tilts: &[Option<Tilt>], frames: &mut [Vec<f64>]) {
-        for (f, tilt) in tilts.iter().enumerate() {
-            let Some(tilt) = tilt else { continue };
-            let anchors = self.air(frames).stood_on(f);
-            spin::tilt_goals(self.model, goals, f, &anchors, (&frames[f], tilt));
-            tilt.apply(self.model.skeleton, &mut frames[f]);
-        }
-        // What flies was turned with its goals, and fits them as before.
-        let leads = |f: usize, _: &[f64]| tilts[f].is_some_and(|tilt| !tilt.flies);
-        let problem = self.problem(goals);
-        self.solver(&problem).mend(frames, leads);
-    }
-
-    /// Fitting anew has moved flights off their parabolas again, by little: now they are moved, and those that `spin` turned,
-    /// as they are.
-    fn set_free(&self, flights: &[Flight], spin: &[Flight], frames: &mut [Vec<f64>]) {
-        let lifts = self.air(frames).lifts_of(flights);
-        for (qpos, lift) in frames.iter_mut().zip(lifts) {
-            if let Some(lift) = lift.filter(|lift| lift.flies) {
-                lift.apply(qpos);
-            }
-        }
-        let tilts = spin::tilts(&self.air(frames), spin).frames;
-        for (qpos, tilt) in frames.iter_mut().zip(tilts) {
-            if let Some(tilt) = tilt.filter(|tilt| tilt.flies) {
-                tilt.apply(self.model.skeleton, qpos);
-            }
-        }
-    }
-
-    /// Solves again, more stiffly, where a coordinate is outside of its limits or a body below the ground.
-    fn mend(&self, problem: &Problem, frames: &mut [Vec<f64>]) {
-        // Clamping moves feet, so it should have nothing left to do.
-        let skeleton = self.model.skeleton;
-        let is_wrong = |_: usize, qpos: &[f64]| {
-            limits::violations(skeleton, qpos) > 0
-                || skeleton.lowest_point(&skeleton.forward(qpos)) < -DEEPEST
-        };
-        let stiffer = cost::weight::STIFF_LIMITS.into_iter();
-        for (limit, ground) in stiffer.zip(cost::weight::STIFF_GROUND) {
-            if !frames.iter().any(|qpos| is_wrong(0, qpos)) {
-                break;
-            }
-            let stiff = Problem {
-                limit,
-                ground,
-                ..*problem
-            };
-            Solver::new(&stiff, self.cycle).mend(frames, is_wrong);
-        }
-        for qpos in frames {
-            limits::clamp(skeleton, qpos);
-        }
-    }
 }
+
+/// How far a flight is shifted at most, metres.
+fn farthest_shift(shifts: &[Option<FlightShift>]) -> f64 {
+    let flying = shifts.iter().flatten().filter(|shift| shift.flies);
+    flying.map(|shift| shift.by.norm()).fold(0.0, f64::max)
+}
+
+/// How far a flight is turned at most, radians.
+fn farthest_turn(turns: &[Option<FlightTurn>]) -> f64 {
+    let flying = turns.iter().flatten().filter(|turn| turn.flies);
+    flying.map(|turn| turn.by.angle()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,86 +1,99 @@
 //! The skeleton as the solver sees it: poses, and how every point moves with every degree of freedom.
+//!
+//! The solver works in the tangent space of the coordinates, in MuJoCo's order of degrees of freedom: the root's position in world
+//! axes, the turn of the root and of ball joints in the turned body's own axes, hinges in radians and slides in metres.
 
 use super::overlap::{self, Pair};
+use super::qpos::{put_quaternion, quaternion, vector};
 use super::rotation::{exp, log};
 use crate::skeleton::{Joint, JointKind, Shape, Skeleton};
-use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// A point of a body's surface: a ball of `radius` (perhaps 0) about `center`, in the body's frame.
+/// A point with which a body can touch the ground: a ball of `radius` (0 for a box's corner) about `center`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Knob {
+pub(super) struct ContactPoint {
+    /// Index of the body.
     pub body: usize,
+    /// In the body's frame, metres.
     pub center: Vector3<f64>,
+    /// Metres.
     pub radius: f64,
-    /// Whether a foot stands on it: not so the upper corners of a box.
+    /// Whether a foot stands on it. The upper corners of a box are no part of the sole.
     pub sole: bool,
 }
 
+impl ContactPoint {
+    /// The centre with all bodies at these places, world, metres.
+    pub fn place(&self, bodies: &[Isometry3<f64>]) -> Vector3<f64> {
+        (bodies[self.body] * Point3::from(self.center)).coords
+    }
+}
+
+/// A skeleton with what the solver needs of it.
 pub(super) struct Model<'a> {
+    /// The skeleton.
     pub skeleton: &'a Skeleton,
     /// For every body the degrees of freedom that move it, ascending.
     pub chains: Vec<Vec<usize>>,
-    /// Whether a degree of freedom turns (or else shifts).
-    pub turns: Vec<bool>,
+    /// Whether a degree of freedom is a rotation; it is a translation otherwise.
+    pub rotates: Vec<bool>,
     /// Spheres' centres, capsules' ends and boxes' corners.
-    pub knobs: Vec<Knob>,
-    /// What must not pass through each other.
+    pub contact_points: Vec<ContactPoint>,
+    /// Shapes that must not pass through each other.
     pub pairs: Vec<Pair>,
 }
 
-/// World transforms of all bodies, and world axis and pivot of every degree of freedom.
+/// A pose with the axes of its degrees of freedom.
 #[derive(Clone)]
 pub(super) struct Pose {
+    /// World from body.
     pub bodies: Vec<Isometry3<f64>>,
+    /// World axis of every degree of freedom.
     pub axes: Vec<Vector3<f64>>,
+    /// A point on the axis of every degree of freedom that is a rotation, world, metres.
     pub pivots: Vec<Vector3<f64>>,
 }
 
-pub(super) fn vector(values: &[f64], at: usize) -> Vector3<f64> {
-    Vector3::new(values[at], values[at + 1], values[at + 2])
-}
-
-pub(super) fn quaternion(qpos: &[f64], at: usize) -> UnitQuaternion<f64> {
-    let q = Quaternion::new(qpos[at], qpos[at + 1], qpos[at + 2], qpos[at + 3]);
-    Unit::try_new(q, 1e-12).unwrap_or_else(UnitQuaternion::identity)
-}
-
-pub(super) fn put_quaternion(qpos: &mut [f64], at: usize, q: &UnitQuaternion<f64>) {
-    qpos[at..at + 4].copy_from_slice(&[q.w, q.i, q.j, q.k]);
-}
-
 impl<'a> Model<'a> {
+    /// Collects what the solver needs.
     pub fn new(skeleton: &'a Skeleton) -> Model<'a> {
         let mut chains: Vec<Vec<usize>> = Vec::with_capacity(skeleton.bodies.len());
-        let mut turns = vec![true; skeleton.nv];
-        let mut knobs = Vec::new();
+        let mut rotates = vec![true; skeleton.nv];
+        let mut contact_points = Vec::new();
         let rest = skeleton.forward(&skeleton.rest_qpos());
         for (b, body) in skeleton.bodies.iter().enumerate() {
             let mut chain = body.parent.map_or_else(Vec::new, |p| chains[p].clone());
             for joint in &body.joints {
                 chain.extend(joint.dof..joint.dof + joint.kind.nv());
                 match joint.kind {
-                    JointKind::Free => turns[joint.dof..joint.dof + 3].fill(false),
-                    JointKind::Slide(_) => turns[joint.dof] = false,
+                    JointKind::Free => rotates[joint.dof..joint.dof + 3].fill(false),
+                    JointKind::Slide(_) => rotates[joint.dof] = false,
                     JointKind::Ball | JointKind::Hinge(_) => {}
                 }
             }
             chain.sort_unstable();
             chains.push(chain);
-            knobs.extend(body.shapes.iter().flat_map(|s| shape_knobs(b, &rest[b], s)));
+            contact_points.extend(
+                body.shapes
+                    .iter()
+                    .flat_map(|s| shape_points(b, &rest[b], s)),
+            );
         }
         Model {
             skeleton,
             chains,
-            turns,
-            knobs,
+            rotates,
+            contact_points,
             pairs: overlap::pairs(skeleton),
         }
     }
 
+    /// All joints, in the order of their coordinates.
     pub fn joints(&self) -> impl Iterator<Item = &'a Joint> {
         self.skeleton.bodies.iter().flat_map(|body| &body.joints)
     }
 
+    /// Memory for a pose.
     pub fn empty_pose(&self) -> Pose {
         Pose {
             bodies: vec![Isometry3::identity(); self.skeleton.bodies.len()],
@@ -89,14 +102,15 @@ impl<'a> Model<'a> {
         }
     }
 
+    /// Forward kinematics with the axes of all degrees of freedom.
     pub fn evaluate(&self, qpos: &[f64], pose: &mut Pose) {
         for b in 0..self.skeleton.bodies.len() {
             self.evaluate_body(b, qpos, pose);
         }
     }
 
-    /// Places one body, whose parent is placed.
-    pub fn evaluate_body(&self, b: usize, qpos: &[f64], pose: &mut Pose) {
+    /// Places one body whose parent is placed already; bodies come after their parents.
+    fn evaluate_body(&self, b: usize, qpos: &[f64], pose: &mut Pose) {
         let body = &self.skeleton.bodies[b];
         let parent = body
             .parent
@@ -108,7 +122,7 @@ impl<'a> Model<'a> {
         pose.bodies[b] = at;
     }
 
-    /// Moves `qpos` along a tangent vector: root position in world axes, turns in the turned body's own axes.
+    /// Moves `qpos` along a tangent vector; rotations are multiplied from the right by exp(v).
     pub fn step(&self, qpos: &mut [f64], tangent: &[f64]) {
         for joint in self.joints() {
             let (q, v) = (joint.qpos, joint.dof);
@@ -129,7 +143,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The tangent vector that leads from `a` to `b`.
+    /// The tangent vector that leads from `a` to `b`: the inverse of [`Model::step`].
     pub fn difference(&self, a: &[f64], b: &[f64], tangent: &mut [f64]) {
         for joint in self.joints() {
             let (q, v) = (joint.qpos, joint.dof);
@@ -147,9 +161,10 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Velocity of world point `p` of a body per rate of degree of freedom `dof`, which moves it.
+    /// A column of the Jacobian of the world point `p` of a body: its velocity for a unit rate of degree of freedom `dof`, which must
+    /// be one that moves the body. ω × r for a rotation, the axis itself for a translation.
     pub fn lever(&self, pose: &Pose, dof: usize, p: &Vector3<f64>) -> Vector3<f64> {
-        if self.turns[dof] {
+        if self.rotates[dof] {
             pose.axes[dof].cross(&(p - pose.pivots[dof]))
         } else {
             pose.axes[dof]
@@ -157,7 +172,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// World from body after `joint`; notes the joint's axes and pivot.
+/// World from body after `joint`, whose axes and pivot are written to `pose`.
 fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) -> Isometry3<f64> {
     let (q, v) = (joint.qpos, joint.dof);
     let (after, axes, count): (Isometry3<f64>, [Vector3<f64>; 3], usize) = match joint.kind {
@@ -188,7 +203,7 @@ fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) 
             (after, [column(0), column(1), column(2)], 3)
         }
     };
-    let pivot = before * nalgebra::Point3::from(joint.anchor);
+    let pivot = before * Point3::from(joint.anchor);
     for (i, axis) in axes.iter().take(count).enumerate() {
         pose.axes[v + i] = *axis;
         pose.pivots[v + i] = pivot.coords;
@@ -196,13 +211,15 @@ fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) 
     after
 }
 
+/// World from body after a turn about the joint's anchor.
 fn turned(before: &Isometry3<f64>, joint: &Joint, turn: UnitQuaternion<f64>) -> Isometry3<f64> {
     let shift = joint.anchor - turn * joint.anchor;
     before * Isometry3::from_parts(shift.into(), turn)
 }
 
-fn shape_knobs(body: usize, rest: &Isometry3<f64>, shape: &Shape) -> Vec<Knob> {
-    let round = |center: &Vector3<f64>, radius: f64| Knob {
+/// The contact points of a shape: where a convex hull of balls has its centres. `rest` is the body in the rest pose.
+fn shape_points(body: usize, rest: &Isometry3<f64>, shape: &Shape) -> Vec<ContactPoint> {
+    let round = |center: &Vector3<f64>, radius: f64| ContactPoint {
         body,
         center: *center,
         radius,
@@ -215,9 +232,9 @@ fn shape_knobs(body: usize, rest: &Isometry3<f64>, shape: &Shape) -> Vec<Knob> {
             .map(|i: usize| {
                 let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
                 let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
-                Knob {
+                ContactPoint {
                     body,
-                    center: (pose * nalgebra::Point3::from(corner)).coords,
+                    center: (pose * Point3::from(corner)).coords,
                     radius: 0.0,
                     sole: (rest.rotation * (pose.rotation * corner)).z <= 0.0,
                 }

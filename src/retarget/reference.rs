@@ -1,6 +1,6 @@
 //! What the result is compared with: the source's joints, limb by limb in the skeleton's size.
 
-use super::goals::{ARMS, LEGS};
+use super::limbs::{ARMS, LEGS};
 use super::source::Source;
 use crate::humanoid::Slot;
 use crate::skeleton::Skeleton;

@@ -1,8 +1,11 @@
-//! The source scaled to the skeleton, and when it stands on what: the measure of the result. Nothing here depends on
-//! the goals that the solver is given.
+//! The source in the skeleton's size, and when its feet and hands are on the ground: what the result is measured against. Nothing
+//! here depends on the goals that the solver is given.
 
-use super::align::Alignment;
-use crate::clip::{Clip, LoopMode};
+use super::anchor::SourceContact;
+use super::frames;
+use super::limbs::HANDS;
+use super::setting::Setting;
+use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
 use crate::motion::contact;
 use crate::skeleton::Skeleton;
@@ -11,32 +14,35 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Feet and hands, with the joint further out that touches the ground with them.
-pub(super) const ENDS: [(Slot, Option<Slot>); 4] = [
+const ENDS: [(Slot, Option<Slot>); 4] = [
     (Slot::LeftFoot, Some(Slot::LeftToes)),
     (Slot::RightFoot, Some(Slot::RightToes)),
     (Slot::LeftHand, None),
     (Slot::RightHand, None),
 ];
-pub(super) const HANDS: [Slot; 2] = [Slot::LeftHand, Slot::RightHand];
-/// Heights that a wrist and the ends of fingers that stand may have beyond those of feet, leg lengths. Hands roll and
-/// slide where feet stand, so that they are measured by legs twice as long, which doubles the heights of feet too.
+/// Heights of a wrist and of the ends of fingers on the ground, beyond those that [`contact`] allows a foot, leg lengths. Chosen: a
+/// wrist is above its palm, and fingertips are where the rig's last joint is.
 const PALM: f64 = 0.02;
 const FINGERTIP: f64 = -0.03;
-const LONGER: f64 = 2.0;
-/// A joint's lowest level in a clip is where it stands if it is this near to where it stands at rest, leg lengths.
+/// Factor of the leg length by which a hand's speed and height are judged. Chosen: hands roll and slide where feet stand still.
+const HAND_LENGTH: f64 = 2.0;
+/// How near a joint's lowest level in a clip has to be to its level in the rest pose to count as standing, leg lengths. Chosen.
 const LIKE_REST: f64 = 0.08;
-/// Share of frames in which a joint may be below its level.
+/// Share of frames in which a joint may be below its level: recordings have outliers. Chosen, as in [`contact`].
 const QUANTILE: f64 = 0.05;
-/// A rest pose whose lowest joint is in this range of heights stands on z = 0, leg lengths.
+/// Heights of a rest pose's lowest joint between which it stands on z = 0, leg lengths. Chosen: toes' joints are up to a shoe above
+/// the sole.
 const STANDS: [f64; 2] = [-0.03, 0.15];
-/// Speed below which a joint of the source stands still, leg lengths per second.
+/// Speed below which a joint of the source is still, leg lengths per second. Chosen: 7 cm/s for a leg of 0.9 m.
 const STILL: f64 = 0.08;
-/// Most joints of a hand that are looked at.
+/// Most ends of fingers that are looked at, which bounds the time for hands of many joints.
 const FINGERS: usize = 6;
 
-/// World positions by slot, one per frame, and those of the rest pose; metres, times the skeleton's scale.
+/// World positions of the source's joints times the skeleton's scale, metres.
 pub(super) struct Source {
+    /// By slot and frame.
     pub points: BTreeMap<Slot, Vec<Vector3<f64>>>,
+    /// By slot, in the rest pose.
     pub rest: BTreeMap<Slot, Vector3<f64>>,
     /// Height of the rest pose's ankles above its ground, if it stands on z = 0.
     pub ankle: Option<f64>,
@@ -46,16 +52,11 @@ pub(super) struct Source {
 }
 
 impl Source {
-    pub fn new(
-        clip: &Clip,
-        map: &HumanoidMap,
-        alignment: &Alignment,
-        skeleton: &Skeleton,
-    ) -> Source {
-        let scale = alignment.scale;
+    /// Reads the clip's joints, times `scale`.
+    pub fn new(clip: &Clip, map: &HumanoidMap, scale: f64, skeleton: &Skeleton) -> Source {
         let at = |world: &[Isometry3<f64>], joint: usize| world[joint].translation.vector * scale;
         let rest = clip.rest_world();
-        // A foot without toes can't roll over them: where the source does that, it doesn't stand.
+        // A foot without toes can't roll over them, so where the source does that, the skeleton has no contact.
         let toes = [Slot::LeftToes, Slot::RightToes];
         let known = |slot: &Slot| !toes.contains(slot) || skeleton.slots.contains_key(slot);
         let slots = map.matches.iter().map(|(slot, found)| (*slot, found.joint));
@@ -85,6 +86,8 @@ impl Source {
         source
     }
 
+    /// Mean height of the ankles in the rest pose, metres, if the pose stands: its lowest foot joint is near z = 0, and its ankles are
+    /// level.
     fn ankle_at_rest(&self, clip: &Clip, map: &HumanoidMap, scale: f64, leg: f64) -> Option<f64> {
         let world = clip.rest_world();
         let feet = [Slot::LeftFoot, Slot::RightFoot].map(|slot| map.joint(slot));
@@ -104,14 +107,12 @@ impl Source {
         stands.then_some((heights[0] + heights[1]) / 2.0)
     }
 
-    /// Leaves the frames `own`.
+    /// Drops everything but the frames `own`.
     pub fn keep(&mut self, own: &Range<usize>) {
-        self.points
-            .values_mut()
-            .for_each(|path| super::keep(path, own));
-        self.fingers
-            .iter_mut()
-            .for_each(|tips| super::keep(tips, own));
+        let paths = self.points.values_mut();
+        paths.for_each(|path| frames::keep(path, own));
+        let hands = self.fingers.iter_mut();
+        hands.for_each(|tips| frames::keep(tips, own));
         self.frames = own.len();
     }
 
@@ -122,64 +123,80 @@ impl Source {
         joints.chain(tips.flatten()).for_each(|point| *point += by);
     }
 
+    /// Position of a slot's joint at frame `f`, if the source has that joint.
     pub fn at(&self, slot: Slot, f: usize) -> Option<Vector3<f64>> {
         self.points.get(&slot)?.get(f).copied()
     }
 
-    /// Whether a foot or hand stands on ground of height `floor`, per frame; `None` without such a joint.
-    pub fn contact(
-        &self,
-        end: Slot,
-        floor: f64,
-        fps: f64,
-        leg: f64,
-        ankle: f64,
-        loop_mode: LoopMode,
-    ) -> Option<Vec<bool>> {
-        let path = self.points.get(&end)?;
-        let lowered = |path: &[Vector3<f64>], by: f64| -> Vec<Vector3<f64>> {
-            path.iter().map(|p| p - Vector3::z() * by).collect()
+    /// When each foot and hand that the source has is on the ground, which is at height `floor`, metres.
+    pub fn contacts(&self, floor: f64, setting: &Setting) -> Vec<SourceContact> {
+        let contact = |slot: Slot| {
+            let touches = self.touches(slot, floor, setting)?;
+            Some(SourceContact { slot, touches })
         };
-        let mut paths: Vec<Vec<Vector3<f64>>> = Vec::new();
-        let mut size = leg;
-        if let Some(hand) = HANDS.iter().position(|hand| *hand == end) {
-            size *= LONGER;
-            let tips = self.tips(hand);
-            paths.extend(tips.iter().map(|path| lowered(path, FINGERTIP * leg)));
-            if paths.is_empty() {
-                paths.push(lowered(path, PALM * leg));
-            }
-        } else {
-            let height = self.ankle.unwrap_or(ankle);
-            paths.push(lowered(path, level(path, floor + height, leg) - floor));
-            let toes = ENDS.iter().find(|e| e.0 == end).and_then(|e| e.1);
-            if let Some(path) = toes.and_then(|toes| self.points.get(&toes)) {
-                paths.push(lowered(
-                    path,
-                    level(path, floor + height / 2.0, leg) - floor,
-                ));
-            }
-        }
+        let ends = ENDS.iter().map(|(end, _)| *end);
+        ends.filter_map(contact).collect()
+    }
+
+    /// Whether a foot or hand is on the ground, by frame; `None` without such a joint.
+    fn touches(&self, end: Slot, floor: f64, setting: &Setting) -> Option<Vec<bool>> {
+        let path = self.points.get(&end)?;
+        let leg = setting.leg;
+        let (paths, size) = match HANDS.iter().position(|hand| *hand == end) {
+            Some(hand) => (self.hand_paths(hand, path, leg), leg * HAND_LENGTH),
+            None => (self.foot_paths(end, path, floor, setting), leg),
+        };
         let stands = |path: &Vec<Vector3<f64>>| -> Vec<bool> {
             let points: Vec<Vec<Vector3<f64>>> = path.iter().map(|p| vec![*p]).collect();
-            contact::detect_above(&points, floor, fps, size, loop_mode)
+            contact::detect_above(&points, floor, setting.fps, size, setting.loop_mode)
         };
         let each: Vec<Vec<bool>> = paths.iter().map(stands).collect();
         let any = |f: usize| each.iter().any(|stands| stands[f]);
         Some((0..self.frames).map(any).collect())
     }
 
-    /// Whether a foot's ankle or toes, or a wrist, hardly move from a frame to the next.
-    pub fn is_still(&self, end: Slot, f: usize, fps: f64, leg: f64) -> bool {
+    /// The paths of what of a hand can touch the ground, lowered to where its skin is: fingertips, or the wrist of a hand without
+    /// fingers.
+    fn hand_paths(&self, hand: usize, wrist: &[Vector3<f64>], leg: f64) -> Vec<Vec<Vector3<f64>>> {
+        let tips = self.tips(hand);
+        if tips.is_empty() {
+            return vec![lowered(wrist, PALM * leg)];
+        }
+        let tips = tips.iter();
+        tips.map(|path| lowered(path, FINGERTIP * leg)).collect()
+    }
+
+    /// The paths of a foot's ankle and toes, lowered so that they are at the ground's height where the foot stands. Toes are taken to
+    /// be half as high as the ankle.
+    fn foot_paths(
+        &self,
+        foot: Slot,
+        ankle: &[Vector3<f64>],
+        floor: f64,
+        setting: &Setting,
+    ) -> Vec<Vec<Vector3<f64>>> {
+        let leg = setting.leg;
+        let height = self.ankle.unwrap_or(setting.ankle);
+        let mut paths = vec![lowered(ankle, level(ankle, floor + height, leg) - floor)];
+        let toes = ENDS.iter().find(|e| e.0 == foot).and_then(|e| e.1);
+        if let Some(path) = toes.and_then(|toes| self.points.get(&toes)) {
+            let by = level(path, floor + height / 2.0, leg) - floor;
+            paths.push(lowered(path, by));
+        }
+        paths
+    }
+
+    /// Whether a foot's ankle or toes, or a wrist, hardly move from frame `f` to the next.
+    pub fn is_still(&self, end: Slot, f: usize, setting: &Setting) -> bool {
         let toes = ENDS.iter().find(|e| e.0 == end).and_then(|e| e.1);
         let still = |slot: Slot| match (self.at(slot, f), self.at(slot, f + 1)) {
-            (Some(a), Some(b)) => (b - a).norm() * fps < STILL * leg,
+            (Some(a), Some(b)) => (b - a).norm() * setting.fps < STILL * setting.leg,
             _ => false,
         };
         still(end) || toes.is_some_and(still)
     }
 
-    /// Paths of a hand's finger ends.
+    /// Paths of the ends of a hand's fingers.
     fn tips(&self, hand: usize) -> Vec<Vec<Vector3<f64>>> {
         let count = self.fingers[hand].first().map_or(0, Vec::len);
         let path = |i: usize| self.fingers[hand].iter().map(|tips| tips[i]).collect();
@@ -187,7 +204,13 @@ impl Source {
     }
 }
 
-/// The level on which a joint stands: its lowest in the clip, unless it never comes down.
+/// A path shifted down, metres.
+fn lowered(path: &[Vector3<f64>], by: f64) -> Vec<Vector3<f64>> {
+    path.iter().map(|p| p - Vector3::z() * by).collect()
+}
+
+/// Height of a joint when its foot stands, metres: its lowest level in the clip, or the one `expected` from the rest pose where the
+/// lowest is far from that, as in a clip in which the foot never comes down.
 fn level(path: &[Vector3<f64>], expected: f64, leg: f64) -> f64 {
     let mut heights: Vec<f64> = path.iter().map(|p| p.z).collect();
     heights.sort_by(f64::total_cmp);
@@ -200,7 +223,7 @@ fn level(path: &[Vector3<f64>], expected: f64, leg: f64) -> f64 {
     }
 }
 
-/// Joints below a hand that have none below them.
+/// The ends of a hand's fingers: joints below it that have none below them.
 fn fingers(clip: &Clip, hand: Option<usize>) -> Vec<usize> {
     let Some(hand) = hand else {
         return Vec::new();

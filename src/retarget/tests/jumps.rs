@@ -1,6 +1,6 @@
 //! No step from a frame to the next that the source doesn't take.
 
-use super::super::goals::{ARMS, LEGS};
+use super::super::limbs::{ARMS, LEGS};
 use super::*;
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ const LONGEST: f64 = 0.06;
 /// By how much a step of an elbow, wrist, knee or ankle is at most longer than the source's, whose bones are drawn in
 /// the skeleton's lengths; both from where the limb begins.
 fn longest_jump(clip: &Clip, skeleton: &Skeleton) -> f64 {
-    let map = humanoid::map(&clip.joints).unwrap();
+    let map = crate::humanoid::map(&clip.joints).unwrap();
     let motion = on_humanoid(clip).motion;
     let frames = 0..motion.bodies.len().min(clip.frames.len());
     let worlds: Vec<Vec<Isometry3<f64>>> = frames.map(|f| clip.world(f)).collect();

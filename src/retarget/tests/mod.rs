@@ -1,19 +1,17 @@
-mod gradient;
 mod jumps;
 mod recorded;
 mod trimmed;
-mod windows;
 
-use super::model::put_quaternion;
+use super::qpos::put_quaternion;
 use super::*;
-use crate::clip::{Joint, Margin, Source};
+use crate::clip::{Joint, LoopMode, Margin, Source};
 use crate::humanoid::Slot;
 use crate::import;
 use mimic_test_support::foreign;
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
-fn clip(file: &str, take: Option<&str>) -> Option<Clip> {
+pub(super) fn clip(file: &str, take: Option<&str>) -> Option<Clip> {
     let options = import::Options {
         take: take.map(str::to_owned),
         ..Default::default()
@@ -22,22 +20,22 @@ fn clip(file: &str, take: Option<&str>) -> Option<Clip> {
 }
 
 /// A character by other people.
-fn foreign_skeleton(file: &str) -> Option<Skeleton> {
+pub(super) fn foreign_skeleton(file: &str) -> Option<Skeleton> {
     let path = foreign(file)?;
     let path = path.to_str().expect("the path is text");
     Some(Skeleton::load(path).unwrap_or_else(|e| panic!("{e}")))
 }
 
-fn humanoid() -> Skeleton {
+pub(super) fn humanoid() -> Skeleton {
     Skeleton::load("humanoid").unwrap()
 }
 
-fn on_humanoid(clip: &Clip) -> Retargeted {
+pub(super) fn on_humanoid(clip: &Clip) -> Retargeted {
     retarget(clip, &humanoid(), &Options::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Numbers between −1 and 1.
-fn random() -> impl FnMut() -> f64 {
+pub(super) fn random() -> impl FnMut() -> f64 {
     let mut seed = 11_u64;
     move || {
         seed = seed

@@ -4,7 +4,7 @@ use super::super::*;
 use super::{clip, coordinate, foreign, foreign_skeleton, humanoid, on_humanoid};
 use crate::humanoid::Slot;
 use crate::import;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 /// Whether a motion has human knees and elbows, its left on the left, and walks forward on alternating feet.
 fn assert_walks(motion: &Motion, skeleton: &Skeleton) {
@@ -271,18 +271,16 @@ fn a_skeleton_rooted_at_its_torso_has_its_hips_where_the_source_has_them() {
     let Some(clip) = clip("deepmimic/humanoid3d_spinkick.txt", None) else {
         return;
     };
-    let map = humanoid::map(&clip.joints).unwrap();
-    let alignment = align::align(&clip, &map, &skeleton).unwrap();
+    let options = Options::default();
+    let input = input::prepare(&clip, &skeleton, &options).unwrap();
     let model = Model::new(&skeleton);
-    let goals = Goals::new(&clip, &map, &alignment, &model, &BTreeMap::new());
-    for (f, qpos) in goals.guess.iter().enumerate() {
+    let posed = pose::pose(&input, &model, &options.weights).unwrap();
+    for (f, qpos) in posed.goals.guess.iter().enumerate() {
         let bodies = skeleton.forward(qpos);
-        let source = clip.world(f);
         let mut apart = Vector3::zeros();
         for slot in [Slot::LeftUpperLeg, Slot::RightUpperLeg] {
-            let joint = map.joint(slot).unwrap();
             apart += bodies[skeleton.slots[&slot]].translation.vector;
-            apart -= source[joint].translation.vector * alignment.scale;
+            apart -= posed.source.at(slot, f).unwrap();
         }
         assert!(apart.norm() < 1e-9, "frame {f}: {}", apart.norm());
     }

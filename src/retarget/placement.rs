@@ -1,0 +1,136 @@
+//! Stage 3, placement: goals and source are moved so that the ground is z = 0 and the root starts above the origin, and limbs are
+//! fitted to that ground.
+//!
+//! In this order, for each step needs the one before: a clip that walks on the spot gets its travel back; the ground is found under
+//! the feet; hands go down to it where the source's do; and feet that are high above it hang on the skeleton's own legs.
+
+mod ground;
+mod hands;
+mod swing;
+mod travel;
+
+use super::anchor::SourceContact;
+use super::end_effector::{end_effectors, soles};
+use super::goals::Goals;
+use super::limbs::HANDS;
+use super::model::Model;
+use super::pose::Posed;
+use super::setting::Setting;
+use super::source::Source;
+use crate::clip::Problem;
+use ground::{Ground, Points};
+use nalgebra::Vector3;
+
+/// Goals and source on the ground.
+pub(super) struct Placed {
+    /// What the skeleton should look like.
+    pub goals: Goals,
+    /// What the result will be measured against; it stands where the goals do.
+    pub source: Source,
+    /// When the source's feet and hands are on the ground.
+    pub contacts: Vec<SourceContact>,
+    /// The warning `travel-restored`.
+    pub problem: Option<Problem>,
+}
+
+/// Puts goals and source on the ground.
+///
+/// `first` is the frame in which the root is above the origin.
+pub(super) fn place(posed: Posed, model: &Model, setting: &Setting, first: usize) -> Placed {
+    let (posed, problem) = with_travel(posed, model, setting);
+    let ground = find_ground(&posed, model, setting);
+    let contacts = posed.source.contacts(ground.floor, setting);
+    let Posed { goals, source } = posed;
+    let goals = with_hands_down(goals, &source, &contacts, &ground, setting.fps);
+    let posed = at_origin(Posed { goals, source }, &ground, first);
+    Placed {
+        goals: swing::on_own_legs(posed.goals, setting.ankle, setting.leg),
+        source: posed.source,
+        contacts,
+        problem,
+    }
+}
+
+/// Gives a clip on the spot the travel that its sliding feet tell of, with a warning.
+fn with_travel(
+    Posed {
+        mut goals,
+        mut source,
+    }: Posed,
+    model: &Model,
+    setting: &Setting,
+) -> (Posed, Option<Problem>) {
+    let velocity = travel::missing(&goals, model, setting);
+    if let Some(velocity) = velocity {
+        for f in 0..goals.frames() {
+            let by = velocity * (f as f64 / setting.fps);
+            goals.shift_frame(f, &by);
+            source.shift_frame(f, &by);
+        }
+    }
+    let problem = velocity.map(|velocity| travel::problem(&velocity));
+    (Posed { goals, source }, problem)
+}
+
+/// Finds the ground under the goals.
+fn find_ground(posed: &Posed, model: &Model, setting: &Setting) -> Ground {
+    let lift = posed.source.ankle.map(|height| height - setting.ankle);
+    let points = ground_points(model, &posed.goals);
+    ground::find(&points, lift, setting)
+}
+
+/// The lowest points of the feet as their goals turn them, and of the whole body as guessed.
+fn ground_points(model: &Model, goals: &Goals) -> Points {
+    let soles = soles(model, goals);
+    let feet = end_effectors(model, goals).into_iter();
+    let in_feet: Vec<usize> = feet.filter(|e| e.is_foot).flat_map(|e| e.points).collect();
+    let others = |k: &usize| !in_feet.contains(k);
+    let others: Vec<usize> = (0..model.contact_points.len()).filter(others).collect();
+    let mut pose = model.empty_pose();
+    let all = |(qpos, soles): (&Vec<f64>, &Vec<Vector3<f64>>)| {
+        model.evaluate(qpos, &mut pose);
+        let place = |k: &usize| {
+            let point = &model.contact_points[*k];
+            point.place(&pose.bodies) - Vector3::z() * point.radius
+        };
+        soles
+            .iter()
+            .copied()
+            .chain(others.iter().map(place))
+            .collect()
+    };
+    let all = goals.guess.iter().zip(&soles).map(all).collect();
+    Points { soles, all }
+}
+
+/// Moves hands to where the source puts them down.
+fn with_hands_down(
+    goals: Goals,
+    source: &Source,
+    contacts: &[SourceContact],
+    ground: &Ground,
+    fps: f64,
+) -> Goals {
+    let hands = contacts.iter().filter(|c| HANDS.contains(&c.slot));
+    hands.fold(goals, |goals, hand| {
+        hands::set_down(goals, source, hand, ground, fps)
+    })
+}
+
+/// Moves everything to where the ground is z = 0 and the root is above the origin in frame `first`.
+fn at_origin(
+    Posed {
+        mut goals,
+        mut source,
+    }: Posed,
+    ground: &Ground,
+    first: usize,
+) -> Posed {
+    let root = goals.root(first);
+    let home = Vector3::new(-root.x, -root.y, -ground.floor - ground.lift);
+    for f in 0..goals.frames() {
+        goals.shift_frame(f, &home);
+        source.shift_frame(f, &home);
+    }
+    Posed { goals, source }
+}

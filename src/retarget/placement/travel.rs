@@ -1,0 +1,114 @@
+//! Clips that walk on the spot get their travel back.
+//!
+//! Games move such a clip by themselves; physics can't walk on a treadmill that isn't there. While a foot is down it slides backward
+//! at the speed of the travel that was taken out, so that speed can be read off the feet.
+
+use crate::clip::{LoopMode, Problem, Severity};
+use crate::retarget::end_effector::soles;
+use crate::retarget::goals::Goals;
+use crate::retarget::model::Model;
+use crate::retarget::setting::Setting;
+use nalgebra::Vector3;
+
+// All chosen, so that the walks and runs on the spot of the clips at hand get their travel, and dances and kicks get none.
+
+/// Farthest that the root of a clip on the spot ends from where it starts, leg lengths.
+const ON_THE_SPOT: f64 = 0.1;
+/// Farthest that it is from its start on the way, leg lengths.
+const STRAYS: f64 = 0.25;
+/// Height above the clip's lowest point below which a foot is down, leg lengths.
+const DOWN: f64 = 0.04;
+/// Slowest travel that is restored, leg lengths per second. A slower slide is a flaw of the clip.
+const SLOWEST: f64 = 0.4;
+/// How near to the median velocity one has to be to agree with it, relative to it …
+const AGREES: f64 = 0.5;
+/// … and the share of the frames with a foot down that have to agree.
+const MAJORITY: f64 = 0.6;
+/// Share of the frames in which each foot is the lower one at least, if the clip doesn't repeat: a gait, and not a single slide.
+/// One in this many frames.
+const ALTERNATES: usize = 5;
+
+/// The velocity that a clip on the spot lacks, m/s, if its feet slide steadily while they are down.
+pub(super) fn missing(goals: &Goals, model: &Model, setting: &Setting) -> Option<Vector3<f64>> {
+    let Setting {
+        fps,
+        leg,
+        loop_mode,
+        ..
+    } = *setting;
+    let last = goals.frames().checked_sub(1)?;
+    let away = |f: usize| (goals.root(f) - goals.root(0)).xy().norm();
+    let strays = (0..=last).any(|f| away(f) > STRAYS * leg);
+    if strays || away(last) > ON_THE_SPOT * leg {
+        return None;
+    }
+    let soles = soles(model, goals);
+    if loop_mode == LoopMode::Clamp && !alternate(&soles) {
+        return None;
+    }
+    Some(-sliding(&soles, fps, leg)?)
+}
+
+/// The warning `travel-restored`.
+pub(super) fn problem(velocity: &Vector3<f64>) -> Problem {
+    Problem {
+        id: "travel-restored".to_owned(),
+        severity: Severity::Warning,
+        message: format!(
+            "the clip moves on the spot and its feet slide; travel of {:.2} m/s was added, with which they stand still",
+            velocity.norm()
+        ),
+    }
+}
+
+/// Whether each foot is the lower one in many frames. Each frame has the left foot's points in its first half.
+fn alternate(soles: &[Vec<Vector3<f64>>]) -> bool {
+    let lowest = |points: &[Vector3<f64>]| points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let left = |frame: &Vec<Vector3<f64>>| {
+        let (left, right) = frame.split_at(frame.len() / 2);
+        lowest(left) < lowest(right)
+    };
+    let count = soles.iter().filter(|frame| left(frame)).count();
+    let least = soles.len() / ALTERNATES;
+    (least..=soles.len() - least).contains(&count) && least > 0
+}
+
+/// Velocity at which feet slide while they are down, m/s; `None` if they slide slowly or unsteadily. The median finds what most
+/// frames agree on, and those frames' mean is the result.
+fn sliding(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64) -> Option<Vector3<f64>> {
+    let lowest = |points: &[Vector3<f64>]| {
+        (0..points.len()).min_by(|a, b| points[*a].z.total_cmp(&points[*b].z))
+    };
+    let floor = soles
+        .iter()
+        .flatten()
+        .map(|p| p.z)
+        .fold(f64::INFINITY, f64::min);
+    let mut velocities: Vec<Vector3<f64>> = Vec::new();
+    for pair in soles.windows(2) {
+        let point = lowest(&pair[0])?;
+        if pair[0][point].z < floor + DOWN * leg {
+            let v = (pair[1][point] - pair[0][point]) * fps;
+            velocities.push(Vector3::new(v.x, v.y, 0.0));
+        }
+    }
+    let middle = Vector3::new(median(&velocities, 0)?, median(&velocities, 1)?, 0.0);
+    let speed = middle.norm();
+    if speed < SLOWEST * leg {
+        return None;
+    }
+    let agreeing: Vec<Vector3<f64>> = velocities
+        .iter()
+        .filter(|v| (*v - middle).norm() < AGREES * speed)
+        .copied()
+        .collect();
+    let steady = agreeing.len() as f64 >= MAJORITY * velocities.len() as f64;
+    steady.then(|| agreeing.iter().sum::<Vector3<f64>>() / agreeing.len() as f64)
+}
+
+/// The median of the vectors' coordinates along an axis.
+fn median(vectors: &[Vector3<f64>], axis: usize) -> Option<f64> {
+    let mut values: Vec<f64> = vectors.iter().map(|v| v[axis]).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}

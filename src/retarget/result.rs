@@ -1,0 +1,143 @@
+//! Stage 7, result: the motion of the fitted coordinates, and a report that measures it against the source.
+
+use super::anchor::{Anchor, SourceContact};
+use super::end_effector::EndEffector;
+use super::frames::keep;
+use super::input::Input;
+use super::model::Model;
+use super::report::{self, Contact};
+use super::setting::Setting;
+use super::source::Source;
+use crate::clip::{Clip, LoopMode, Problem};
+use crate::motion::{Cycle, Draft, Motion, RetargetReport};
+
+/// A trajectory with all that its motion and its report need.
+pub(super) struct Outcome {
+    /// Coordinates of every frame.
+    pub frames: Vec<Vec<f64>>,
+    /// The points that stand, by frame.
+    pub anchors: Vec<Vec<Anchor>>,
+    /// The feet and hands.
+    pub effectors: Vec<EndEffector>,
+    /// For a motion that repeats.
+    pub cycle: Option<Cycle>,
+    /// What the motion is measured against.
+    pub source: Source,
+    /// When the source's feet and hands are on the ground.
+    pub contacts: Vec<SourceContact>,
+    /// All that was found in the clip and changed.
+    pub problems: Vec<Problem>,
+}
+
+impl Outcome {
+    /// Drops the frames around the clip's own, which only helped to solve for these.
+    fn own(mut self, input: &Input) -> Outcome {
+        keep(&mut self.frames, &input.own);
+        keep(&mut self.anchors, &input.own);
+        self.source.keep(&input.own);
+        let contacts = self.contacts.iter_mut();
+        contacts.for_each(|contact| keep(&mut contact.touches, &input.own));
+        self
+    }
+}
+
+/// Makes the motion, and the report that it carries.
+pub(super) fn finish(
+    outcome: Outcome,
+    input: &Input,
+    model: &Model,
+    setting: &Setting,
+) -> (Motion, RetargetReport) {
+    let Outcome {
+        frames,
+        anchors,
+        effectors,
+        cycle,
+        source,
+        contacts,
+        problems,
+    } = outcome.own(input);
+    let contact_bodies = contact_bodies(model, &effectors, &anchors);
+    let contact = contact(model, &anchors, &contact_bodies);
+    let draft = draft(&input.clip, cycle, frames, contact, contact_bodies);
+    let mut motion = Motion::from_poses(model.skeleton, draft);
+    let measured = measured(model, &effectors, &contacts, &source, setting);
+    let map = report::mapped(&input.clip, &input.map);
+    let report = report::report(model.skeleton, &source, &measured, &motion, map, problems);
+    motion.report = Some(report.clone());
+    (motion, report)
+}
+
+/// The motion before its tracks are computed.
+fn draft(
+    clip: &Clip,
+    cycle: Option<Cycle>,
+    qpos: Vec<Vec<f64>>,
+    contact: Vec<Vec<bool>>,
+    contact_bodies: Vec<usize>,
+) -> Draft {
+    Draft {
+        name: clip.name.clone(),
+        fps: clip.fps,
+        loop_mode: match cycle {
+            Some(_) => LoopMode::Wrap,
+            None => LoopMode::Clamp,
+        },
+        cycle: cycle.unwrap_or(Cycle::NONE),
+        qpos,
+        contact: Some(contact),
+        contact_bodies,
+    }
+}
+
+/// Bodies that may touch the ground: those of the feet, and those of hands that the clip sets down; ascending.
+fn contact_bodies(model: &Model, effectors: &[EndEffector], anchors: &[Vec<Anchor>]) -> Vec<usize> {
+    let body = |point: usize| model.contact_points[point].body;
+    let used = |b: usize| anchors.iter().flatten().any(|a| body(a.point) == b);
+    let mut bodies: Vec<usize> = Vec::new();
+    for effector in effectors {
+        for b in effector.points.iter().map(|point| body(*point)) {
+            if !bodies.contains(&b) && (effector.is_foot || used(b)) {
+                bodies.push(b);
+            }
+        }
+    }
+    bodies.sort_unstable();
+    bodies
+}
+
+/// `contact[f][c]`: whether contact body `c` stands at frame `f`.
+fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) -> Vec<Vec<bool>> {
+    let is_on = |a: &Anchor, body: usize| model.contact_points[a.point].body == body;
+    let stands = |frame: &[Anchor], body: usize| {
+        let mut contacts = frame.iter().filter(|a| a.is_contact());
+        contacts.any(|a| is_on(a, body))
+    };
+    let row = |frame: &Vec<Anchor>| bodies.iter().map(|b| stands(frame, *b)).collect();
+    anchors.iter().map(row).collect()
+}
+
+/// The source's contacts, on the skeleton's bodies: what the report compares.
+fn measured(
+    model: &Model,
+    effectors: &[EndEffector],
+    contacts: &[SourceContact],
+    source: &Source,
+    setting: &Setting,
+) -> Vec<Contact> {
+    let on_bodies = |contact: &SourceContact| {
+        let slot = contact.slot;
+        let effector = effectors.iter().find(|e| e.slot == slot)?;
+        let points = effector.points.iter();
+        let mut bodies: Vec<usize> = points.map(|p| model.contact_points[*p].body).collect();
+        bodies.dedup();
+        let touches = contact.touches.iter().enumerate();
+        let stands = touches.map(|(f, touches)| *touches && source.is_still(slot, f, setting));
+        Some(Contact {
+            bodies,
+            stands: stands.collect(),
+            touches: contact.touches.clone(),
+        })
+    };
+    contacts.iter().filter_map(on_bodies).collect()
+}
