@@ -56,8 +56,8 @@ pub(super) fn is_anchored(model: &Model, slot: Slot, anchors: &[Anchor]) -> bool
     body.is_some_and(stands)
 }
 
-/// `paths[e][p][f]`: centre of contact point `p` of end effector `e`, which is where its goals say and turned as they say; world,
-/// metres. The pose around it is the guess.
+/// `paths[e][p][f]`: centre of contact point `p` of end effector `e`, which is where its goals say and turned as they say;
+/// world, metres. The pose around it is the guess.
 pub(super) fn paths(
     model: &Model,
     goals: &Goals,
@@ -71,11 +71,12 @@ pub(super) fn paths(
         for (effector, paths) in effectors.iter().zip(&mut paths) {
             let body = goals.keypoints[effector.keypoint].body;
             let guessed = pose.bodies[body];
-            // A chain of single hinges can't be guessed well, but how the foot should be turned is known all the same. With the guess
-            // alone, feet of `robot` stood 5 cm above the ground.
+            // A chain of single hinges can't be guessed well, but how the foot should be turned is known all the same. With
+            // the guess alone, feet of `robot` stood 5 cm above the ground.
             let wanted = goals.orientations.iter().position(|o| o.body == body);
             let wanted = wanted.map_or(guessed.rotation, |o| goals.rotations[f][o]);
             let goal = Isometry3::from_parts(goals.points[f][effector.keypoint].into(), wanted);
+            // What carries the limb's end from the guess to its goal carries its points along.
             let moved = goal * guessed.inverse();
             for (point, path) in effector.points.iter().zip(paths) {
                 let at = model.contact_points[*point].place(&pose.bodies);
@@ -93,6 +94,7 @@ pub(super) fn soles(model: &Model, goals: &Goals) -> Vec<Vec<Vector3<f64>>> {
     let mut soles: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); goals.frames()];
     for (foot, paths) in feet.iter().zip(&paths(model, goals, &feet)) {
         for (point, path) in foot.points.iter().zip(paths) {
+            // A ball's lowest point is a radius below its centre.
             let down = Vector3::z() * model.contact_points[*point].radius;
             for (f, p) in path.iter().enumerate() {
                 soles[f].push(p - down);

@@ -5,8 +5,8 @@ pub(super) fn ramp([full, none]: [f64; 2], value: f64) -> f64 {
     ((none - value) / (none - full)).clamp(0.0, 1.0)
 }
 
-/// 3t² − 2t³: rises from 0 at t = 0 to 1 at t = 1 and is level at both ends, so that whatever it fades begins and ends without a
-/// jump of velocity. `t` is between 0 and 1.
+/// 3t² − 2t³: rises from 0 at t = 0 to 1 at t = 1 and is level at both ends, so that whatever it fades begins and ends
+/// without a jump of velocity. `t` is between 0 and 1.
 pub(super) fn smoothstep(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }

@@ -1,9 +1,10 @@
-//! Stage 6, fit: one trajectory of the skeleton is fitted to its goals, with flights that fall and spin freely, inside the joint limits
-//! and above the ground.
+//! Stage 6, fit: one trajectory of the skeleton is fitted to its goals, with flights that fall and spin freely, inside the
+//! joint limits and above the ground.
 //!
-//! Flights can be told only from a trajectory that is nearly right, so the fit goes in steps, each from the result of the one before:
-//! a first fit to the goals; flights shifted onto their parabolas, with the frames that lead to them solved again; flights turned to spin
-//! freely, likewise; frames that break a limit solved again more stiffly; and flights put back onto the paths that fitting moved them off.
+//! Flights can be told only from a trajectory that is nearly right, so the fit goes in steps, each from the result of the
+//! one before: a first fit to the goals; flights shifted onto their parabolas, with the frames that lead to them solved
+//! again; flights turned to spin freely, likewise; frames that break a limit solved again more stiffly; and flights put back
+//! onto the paths that fitting moved them off.
 
 mod ballistic;
 mod banded;
@@ -14,6 +15,7 @@ mod solver;
 mod span;
 mod spin;
 mod system;
+mod tile;
 mod torque_free;
 mod trajectory;
 mod weight;
@@ -107,6 +109,7 @@ impl<'a> Fit<'a> {
         let fallen = self.shifted(fitting, shifts);
         let turns = spin::turns(&self.trajectory(&fallen.frames), flights);
         let Fitting { goals, frames } = self.turned(fallen, &turns.frames);
+        // Limits come first, for a stiffer fit moves flights again.
         let frames = self.within_limits(&goals, frames);
         let frames = self.put_back(frames, flights, &turns.free);
         // A flight that was put back may touch what it flew past.
@@ -125,6 +128,7 @@ impl<'a> Fit<'a> {
             mut goals,
             mut frames,
         } = fitting;
+        // Goals and trajectory are shifted alike, so what flies still fits; only what leads to it has to be solved for.
         for (f, shift) in shifts.iter().enumerate() {
             let Some(shift) = shift else { continue };
             let anchors = self.trajectory(&frames).stood_on(f);
@@ -155,8 +159,8 @@ impl<'a> Fit<'a> {
         Fitting { goals, frames }
     }
 
-    /// Puts flights back onto their parabolas, and those of `spin` back to one angular momentum. Fitting has moved them off by little,
-    /// so what flies is moved as it is, and what leads to it stays.
+    /// Puts flights back onto their parabolas, and those of `spin` back to one angular momentum. Fitting has moved them off
+    /// by little, so what flies is moved as it is, and what leads to it stays.
     fn put_back(
         &self,
         mut frames: Vec<Vec<f64>>,
@@ -178,8 +182,8 @@ impl<'a> Fit<'a> {
         frames
     }
 
-    /// Solves again, more and more stiffly, where a coordinate is outside of its limits or a body below the ground, and clamps what is
-    /// left. Clamping moves feet, so it should have nothing left to do.
+    /// Solves again, more and more stiffly, where a coordinate is outside of its limits or a body below the ground, and
+    /// clamps what is left. Clamping moves feet, so it should have nothing left to do.
     fn within_limits(&self, goals: &Goals, mut frames: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let skeleton = self.model.skeleton;
         let is_wrong = |_: usize, qpos: &[f64]| {
@@ -188,6 +192,7 @@ impl<'a> Fit<'a> {
         };
         let stiffer = weight::STIFF_LIMITS.into_iter();
         for (limit, ground) in stiffer.zip(weight::STIFF_GROUND) {
+            // Most motions are right at the first go.
             if !frames.iter().any(|qpos| is_wrong(0, qpos)) {
                 break;
             }

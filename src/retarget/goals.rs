@@ -42,8 +42,8 @@ pub(super) struct Goals {
     pub rotations: Vec<Vec<UnitQuaternion<f64>>>,
     /// `guess[f]`: coordinates that take over the source's orientations; where the solver starts.
     pub guess: Vec<Vec<f64>>,
-    /// `ankle_offsets[f]`: from the left and the right ankle's target to where the ankle would be if the skeleton's own leg had the
-    /// source's directions, metres.
+    /// `ankle_offsets[f]`: from the left and the right ankle's target to where the ankle would be if the skeleton's own leg
+    /// had the source's directions, metres.
     pub ankle_offsets: Vec<[Vector3<f64>; 2]>,
     /// How fast hinges may turn.
     pub speeds: HingeSpeeds,
@@ -85,11 +85,12 @@ impl Goals {
         }
     }
 
-    /// Moves the targets of a limb at frame `f`: the keypoint `key` at its end wholly, the knee or elbow half the way, so that the
-    /// limb bends instead of breaking.
+    /// Moves the targets of a limb at frame `f`: the keypoint `key` at its end wholly, the knee or elbow half the way, so
+    /// that the limb bends instead of breaking.
     pub fn shift_limb(&mut self, f: usize, key: usize, by: &LimbShift) {
         let Keypoint { slot, body, .. } = self.keypoints[key];
         self.points[f][key] += by.shift;
+        // Knee or elbow, if it has a target.
         let middle = limbs::joint_above(slot).and_then(|slot| self.keypoint(slot));
         if let Some(k) = middle {
             self.points[f][k] += by.shift / 2.0;

@@ -1,8 +1,9 @@
 //! How fast hinges may turn.
 //!
-//! A limb whose joints are several hinges reaches most places in more than one way, and each way ends at the hinges' limits. Where
-//! another way becomes the better one, nothing but a limit on the speed keeps the limb from changing over between two frames, by up
-//! to 2.6 rad (measured on `marathon`). A ball joint has no such second way, so a skeleton of ball joints has no limits here.
+//! A limb whose joints are several hinges reaches most places in more than one way, and each way ends at the hinges' limits.
+//! Where another way becomes the better one, nothing but a limit on the speed keeps the limb from changing over between two
+//! frames, by up to 2.6 rad (measured on `marathon`). A ball joint has no such second way, so a skeleton of ball joints has
+//! no limits here.
 
 use super::limbs::arms_and_legs;
 use super::model::Model;
@@ -10,15 +11,15 @@ use crate::humanoid::Slot;
 use crate::skeleton::JointKind;
 use nalgebra::Vector3;
 
-/// Speed that a hinge may always have, rad/s. Chosen; with [`FASTER`] and the weight of the penalty, the longest steps beyond the
-/// source's fell from 387 to 268 cm, summed over 55 clips on `marathon`.
+/// Speed that a hinge may always have, rad/s. Chosen; with [`FASTER`] and the weight of the penalty, the longest steps
+/// beyond the source's fell from 387 to 268 cm, summed over 55 clips on `marathon`.
 const ALWAYS: f64 = 6.0;
-/// Multiple of the limb's own speed in the source that a hinge may have on top, chosen with it: one and a half, because a hinge's
-/// axis isn't the axis about which the limb turns.
+/// Multiple of the limb's own speed in the source that a hinge may have on top, chosen with it: one and a half, because a
+/// hinge's axis isn't the axis about which the limb turns.
 const FASTER: f64 = 1.5;
 
-/// Directions of the upper and the lower part of each limb in the source, in the root's frame, in the order of [`arms_and_legs`];
-/// `None` where the source lacks a joint.
+/// Directions of the upper and the lower part of each limb in the source, in the root's frame, in the order of
+/// [`arms_and_legs`]; `None` where the source lacks a joint.
 pub(super) type LimbDirections = [[Option<Vector3<f64>>; 2]; 4];
 
 /// The most that hinges may turn from each frame to the next.
@@ -34,6 +35,7 @@ impl HingeSpeeds {
     /// The limits for a source whose limbs have these directions, frame by frame, at `fps` Hz.
     pub fn new(model: &Model, directions: &[LimbDirections], fps: f64) -> HingeSpeeds {
         let own = arms_and_legs().map(|limb| hinges(model, &limb));
+        // Nothing to limit, and no memory for it, on a skeleton of ball joints.
         if own.iter().all(Vec::is_empty) {
             return HingeSpeeds::default();
         }
@@ -41,6 +43,7 @@ impl HingeSpeeds {
             let next = directions.get(f + 1).unwrap_or(&directions[f]);
             let limbs = own.iter().zip(directions[f].iter().zip(next));
             let most = limbs.flat_map(|(hinges, (now, next))| {
+                // Radians from frame to frame.
                 let most = ALWAYS / fps + FASTER * turned(now, next);
                 hinges.iter().map(move |_| most)
             });

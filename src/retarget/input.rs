@@ -126,8 +126,8 @@ fn check_finite(
     }
 }
 
-/// Refuses a skeleton whose root doesn't move by one free joint alone, or whose other bodies have such joints: coordinates 0 to 6
-/// are taken to be the root's position and orientation.
+/// Refuses a skeleton whose root doesn't move by one free joint alone, or whose other bodies have such joints: coordinates 0
+/// to 6 are taken to be the root's position and orientation.
 fn check_root(skeleton: &Skeleton) -> Result<(), RetargetError> {
     let root = skeleton.bodies.first().map(|body| &body.joints[..]);
     let joints = skeleton.bodies.iter().flat_map(|body| &body.joints);

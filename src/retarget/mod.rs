@@ -10,8 +10,8 @@
 //! 6. `fit`: one least-squares problem over the whole trajectory, and flights that follow the laws of motion.
 //! 7. `result`: the motion with its tracks, and a report that measures it against the source.
 //!
-//! The motion keeps the clip's heading. It is moved over the ground so that the root starts above the origin, and in height so that
-//! the ground is z = 0.
+//! The motion keeps the clip's heading. It is moved over the ground so that the root starts above the origin, and in height
+//! so that the ground is z = 0.
 
 mod anchor;
 mod end_effector;
@@ -65,11 +65,12 @@ pub struct Retargeted {
 
 /// Carries `clip` onto `skeleton`.
 ///
-/// The motion has the clip's frame rate. Of a clip of fewer than 27 frames a second it has a multiple of that, which reaches 60 Hz or is
-/// eight times as many.
+/// The motion has the clip's frame rate. Of a clip of fewer than 27 frames a second it has a multiple of that, which reaches
+/// 60 Hz or is eight times as many.
 ///
 /// # Errors
-/// [`RetargetError`] if the clip is malformed or no humanoid, a weight is out of range, or the skeleton has no free root or no legs.
+/// [`RetargetError`] if the clip is malformed or no humanoid, a weight is out of range, or the skeleton has no free root or
+/// no legs.
 pub fn retarget(
     clip: &Clip,
     skeleton: &Skeleton,

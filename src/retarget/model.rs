@@ -1,7 +1,8 @@
 //! The skeleton as the solver sees it: poses, and how every point moves with every degree of freedom.
 //!
-//! The solver works in the tangent space of the coordinates, in MuJoCo's order of degrees of freedom: the root's position in world
-//! axes, the turn of the root and of ball joints in the turned body's own axes, hinges in radians and slides in metres.
+//! The solver works in the tangent space of the coordinates, in MuJoCo's order of degrees of freedom: the root's position in
+//! world axes, the turn of the root and of ball joints in the turned body's own axes, hinges in radians and slides in
+//! metres.
 
 use super::overlap::{self, Pair};
 use super::qpos::{put_quaternion, quaternion, vector};
@@ -62,6 +63,7 @@ impl<'a> Model<'a> {
         let mut contact_points = Vec::new();
         let rest = skeleton.forward(&skeleton.rest_qpos());
         for (b, body) in skeleton.bodies.iter().enumerate() {
+            // Bodies come after their parents, so the parent's chain is known.
             let mut chain = body.parent.map_or_else(Vec::new, |p| chains[p].clone());
             for joint in &body.joints {
                 chain.extend(joint.dof..joint.dof + joint.kind.nv());
@@ -161,8 +163,8 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// A column of the Jacobian of the world point `p` of a body: its velocity for a unit rate of degree of freedom `dof`, which must
-    /// be one that moves the body. ω × r for a rotation, the axis itself for a translation.
+    /// A column of the Jacobian of the world point `p` of a body: its velocity for a unit rate of degree of freedom `dof`,
+    /// which must be one that moves the body. ω × r for a rotation, the axis itself for a translation.
     pub fn lever(&self, pose: &Pose, dof: usize, p: &Vector3<f64>) -> Vector3<f64> {
         if self.rotates[dof] {
             pose.axes[dof].cross(&(p - pose.pivots[dof]))
@@ -177,6 +179,7 @@ fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) 
     let (q, v) = (joint.qpos, joint.dof);
     let (after, axes, count): (Isometry3<f64>, [Vector3<f64>; 3], usize) = match joint.kind {
         JointKind::Free => {
+            // MuJoCo's free joint: position in world axes, rotation about the body's own axes through its origin.
             let turn = quaternion(qpos, q + 3);
             let at = vector(qpos, q);
             let m = turn.to_rotation_matrix();
@@ -197,6 +200,7 @@ fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) 
             (turned(before, joint, turn), [before.rotation * axis; 3], 1)
         }
         JointKind::Ball => {
+            // A ball joint's degrees of freedom are the axes of the body after the turn.
             let after = turned(before, joint, quaternion(qpos, q));
             let m = after.rotation.to_rotation_matrix();
             let column = |i: usize| -> Vector3<f64> { m.matrix().column(i).into() };
@@ -213,6 +217,7 @@ fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) 
 
 /// World from body after a turn about the joint's anchor.
 fn turned(before: &Isometry3<f64>, joint: &Joint, turn: UnitQuaternion<f64>) -> Isometry3<f64> {
+    // Rotation about the anchor a: x ↦ R x + (a − R a).
     let shift = joint.anchor - turn * joint.anchor;
     before * Isometry3::from_parts(shift.into(), turn)
 }
@@ -231,11 +236,13 @@ fn shape_points(body: usize, rest: &Isometry3<f64>, shape: &Shape) -> Vec<Contac
         Shape::Box { pose, half } => (0..8)
             .map(|i: usize| {
                 let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+                // The eight corners, by the bits of their number.
                 let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
                 ContactPoint {
                     body,
                     center: (pose * Point3::from(corner)).coords,
                     radius: 0.0,
+                    // The lower corners with the body at rest.
                     sole: (rest.rotation * (pose.rotation * corner)).z <= 0.0,
                 }
             })

@@ -1,29 +1,34 @@
 //! Self-collision: limbs that would pass through each other or the trunk.
+//!
+//! Every shape is taken for a capsule: the distance of two of them is that of two segments, which is cheap and smooth nearly
+//! everywhere.
 
 use crate::skeleton::{Shape, Skeleton};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// A shape as a segment with a radius, in its body's frame.
+/// A shape as a capsule: a segment with a radius, in its body's frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Piece {
+struct Capsule {
     body: usize,
     ends: [Vector3<f64>; 2],
     radius: f64,
 }
 
-/// Two pieces that are apart in the rest pose, of bodies that are neither joined nor hang on the same one.
+/// Two capsules that should stay apart: they are apart in the rest pose, and their bodies are neither joined nor hang on the
+/// same one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pair([Piece; 2]);
+pub(super) struct Pair([Capsule; 2]);
 
-/// Where two pieces are in each other.
+/// Where two capsules are in each other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Overlap {
+    /// Indices of their bodies.
     pub bodies: [usize; 2],
-    /// On the axes of both, world.
+    /// The nearest points on the axes of both, world, metres.
     pub points: [Vector3<f64>; 2],
-    /// From the second to the first, of length one.
+    /// Unit vector from the second to the first, world.
     pub normal: Vector3<f64>,
-    /// Metres.
+    /// How far they are in each other, metres.
     pub depth: f64,
 }
 
@@ -31,17 +36,18 @@ pub(super) struct Overlap {
 pub(super) fn pairs(skeleton: &Skeleton) -> Vec<Pair> {
     let rest = skeleton.forward(&skeleton.rest_qpos());
     let bodies = skeleton.bodies.iter().enumerate();
-    let pieces: Vec<Piece> = bodies
-        .flat_map(|(b, body)| body.shapes.iter().map(move |shape| piece(b, shape)))
+    let capsules: Vec<Capsule> = bodies
+        .flat_map(|(b, body)| body.shapes.iter().map(move |shape| capsule(b, shape)))
         .collect();
     let joined = |a: usize, b: usize| {
         let parent = |body: usize| skeleton.bodies[body].parent;
         a == b || parent(a) == Some(b) || parent(b) == Some(a) || parent(a) == parent(b)
     };
     let mut found = Vec::new();
-    for (i, a) in pieces.iter().enumerate() {
-        for b in pieces[i + 1..].iter().filter(|b| !joined(a.body, b.body)) {
+    for (i, a) in capsules.iter().enumerate() {
+        for b in capsules[i + 1..].iter().filter(|b| !joined(a.body, b.body)) {
             let pair = Pair([*a, *b]);
+            // Shapes of neighbours overlap by design, as those of hand and forearm do.
             if pair.overlap(&rest).is_none() {
                 found.push(pair);
             }
@@ -50,8 +56,8 @@ pub(super) fn pairs(skeleton: &Skeleton) -> Vec<Pair> {
     found
 }
 
-/// A box is as thick as the mean of its two shorter sides.
-fn piece(body: usize, shape: &Shape) -> Piece {
+/// The capsule of a shape. That of a box lies along its longest side and is as thick as the mean of the others.
+fn capsule(body: usize, shape: &Shape) -> Capsule {
     let (ends, radius) = match shape {
         Shape::Sphere { center, radius } => ([*center; 2], *radius),
         Shape::Capsule { a, b, radius } => ([*a, *b], *radius),
@@ -63,10 +69,11 @@ fn piece(body: usize, shape: &Shape) -> Piece {
             ([end(along), end(-along)], radius)
         }
     };
-    Piece { body, ends, radius }
+    Capsule { body, ends, radius }
 }
 
-impl Piece {
+impl Capsule {
+    /// A ball around the capsule: its centre, world, and its radius, metres.
     fn middle_and_reach(&self, pose: &Isometry3<f64>) -> (Point3<f64>, f64) {
         let [a, b] = self.ends;
         let reach = (a - b).norm() / 2.0 + self.radius;
@@ -79,6 +86,7 @@ impl Pair {
     pub fn overlap(&self, bodies: &[Isometry3<f64>]) -> Option<Overlap> {
         let [one, other] = &self.0;
         let (first, second) = (&bodies[one.body], &bodies[other.body]);
+        // Most pairs are far apart, which their balls tell quickly.
         let (a, reach) = one.middle_and_reach(first);
         let (b, other_reach) = other.middle_and_reach(second);
         if (a - b).norm_squared() > (reach + other_reach).powi(2) {
@@ -92,7 +100,7 @@ impl Pair {
         let apart = points[0] - points[1];
         let distance = apart.norm();
         let depth = one.radius + other.radius - distance;
-        // Axes that cross have no side to go to.
+        // Axes that cross have no side to go apart to.
         (depth > 0.0 && distance > 1e-6).then(|| Overlap {
             bodies: [one.body, other.body],
             points,
@@ -111,6 +119,7 @@ fn nearest([p, p_end]: [Vector3<f64>; 2], [q, q_end]: [Vector3<f64>; 2]) -> [Vec
         along_p.dot(&between),
         along_q.dot(&between),
     );
+    // A segment without a length is a point.
     let share = |value: f64, of: f64| {
         if of > 1e-12 {
             (value / of).clamp(0.0, 1.0)
@@ -118,6 +127,8 @@ fn nearest([p, p_end]: [Vector3<f64>; 2], [q, q_end]: [Vector3<f64>; 2]) -> [Vec
             0.0
         }
     };
+    // The nearest point of the first line, clamped to the segment; that of the second for it; and the first again, for the
+    // clamped one.
     let mut s = share(pq * q_between - p_between * qq, pp * qq - pq * pq);
     let t = share(pq * s + q_between, qq);
     s = share(pq * t - p_between, pp);

@@ -1,8 +1,9 @@
-//! Stage 3, placement: goals and source are moved so that the ground is z = 0 and the root starts above the origin, and limbs are
-//! fitted to that ground.
+//! Stage 3, placement: goals and source are moved so that the ground is z = 0 and the root starts above the origin, and
+//! limbs are fitted to that ground.
 //!
-//! In this order, for each step needs the one before: a clip that walks on the spot gets its travel back; the ground is found under
-//! the feet; hands go down to it where the source's do; and feet that are high above it hang on the skeleton's own legs.
+//! In this order, for each step needs the one before: a clip that walks on the spot gets its travel back; the ground is
+//! found under the feet; hands go down to it where the source's do; and feet that are high above it hang on the skeleton's
+//! own legs.
 
 mod ground;
 mod hands;
@@ -63,6 +64,7 @@ fn with_travel(
     let velocity = travel::missing(&goals, model, setting);
     if let Some(velocity) = velocity {
         for f in 0..goals.frames() {
+            // From the first frame on, so that the clip starts where it did.
             let by = velocity * (f as f64 / setting.fps);
             goals.shift_frame(f, &by);
             source.shift_frame(f, &by);
@@ -74,6 +76,7 @@ fn with_travel(
 
 /// Finds the ground under the goals.
 fn find_ground(posed: &Posed, model: &Model, setting: &Setting) -> Ground {
+    // Ankles are at the source's height, so soles differ by how much higher its ankles are above its soles.
     let lift = posed.source.ankle.map(|height| height - setting.ankle);
     let points = ground_points(model, &posed.goals);
     ground::find(&points, lift, setting)
@@ -83,6 +86,7 @@ fn find_ground(posed: &Posed, model: &Model, setting: &Setting) -> Ground {
 fn ground_points(model: &Model, goals: &Goals) -> Points {
     let soles = soles(model, goals);
     let feet = end_effectors(model, goals).into_iter();
+    // Feet are turned as their goals say, the rest of the body is as guessed.
     let in_feet: Vec<usize> = feet.filter(|e| e.is_foot).flat_map(|e| e.points).collect();
     let others = |k: &usize| !in_feet.contains(k);
     let others: Vec<usize> = (0..model.contact_points.len()).filter(others).collect();

@@ -1,8 +1,8 @@
 //! Stage 2, pose: for every frame, what the source's pose asks of the skeleton.
 //!
-//! The rest poses are aligned once. Then each frame of the source becomes target positions and orientations, and coordinates that
-//! take over the source's orientations as far as the joints can, from which the solver starts. Frames don't depend on each other, so
-//! that the same pose gives the same goals wherever the clip begins.
+//! The rest poses are aligned once. Then each frame of the source becomes target positions and orientations, and coordinates
+//! that take over the source's orientations as far as the joints can, from which the solver starts. Frames don't depend on
+//! each other, so that the same pose gives the same goals wherever the clip begins.
 
 mod align;
 mod guess;
@@ -23,7 +23,8 @@ use guess::Guesser;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
-/// The goals of all frames, and the source that they were taken from, both still where the clip has them, scaled to the skeleton.
+/// The goals of all frames, and the source that they were taken from, both still where the clip has them, scaled to the
+/// skeleton.
 pub(super) struct Posed {
     /// What the skeleton should look like.
     pub goals: Goals,
@@ -74,6 +75,7 @@ fn goals(
     let mut directions = Vec::with_capacity(clip.frames.len());
     for f in 0..clip.frames.len() {
         let source = clip.world(f);
+        // Orientations first, then the pose that they make, then the targets on it.
         let mut rotations = bound_rotations(&alignment.binds, &source);
         let middle = scaled.middle_of_hips(&source);
         let (qpos, bodies) = guesser.guess(middle, &rotations, goals.guess.last());
@@ -188,9 +190,9 @@ impl<'a> Builder<'a> {
 
     /// The targets of the keypoints, and the ankles' offsets of [`Goals::ankle_offsets`]. `bodies` is the guess.
     ///
-    /// Hips and shoulders are where the guess has them; knees, elbows and wrists are at the end of bones that have the source's
-    /// directions and the skeleton's lengths, so that poses look alike on a body of other proportions. Ankles are where the scaled
-    /// source has them instead: with the skeleton's bones, feet would slide over the ground.
+    /// Hips and shoulders are where the guess has them; knees, elbows and wrists are at the end of bones that have the
+    /// source's directions and the skeleton's lengths, so that poses look alike on a body of other proportions. Ankles are
+    /// where the scaled source has them instead: with the skeleton's bones, feet would slide over the ground.
     fn points(
         &self,
         keypoints: &[Keypoint],
@@ -200,6 +202,7 @@ impl<'a> Builder<'a> {
         let at = |body: usize| bodies[body].translation.vector;
         let mut points: Vec<Vector3<f64>> = keypoints.iter().map(|key| at(key.body)).collect();
         let keypoint = |slot: Slot| keypoints.iter().position(|key| key.slot == slot);
+        // Down each limb from where the guess has its first joint, bone by bone, as far as the source has them.
         for limb in ARMS.iter().chain(&LEGS) {
             let Some(mut joint) = self.skeleton.slots.get(&limb[0]).map(|b| at(*b)) else {
                 continue;
@@ -215,6 +218,7 @@ impl<'a> Builder<'a> {
             }
         }
         let mut ankle_offsets = [Vector3::zeros(); 2];
+        // Ankles replace the ends of legs; the difference is kept for feet in the air.
         for (leg, offset) in LEGS.iter().zip(&mut ankle_offsets) {
             if let (Some(k), Some(p)) = (keypoint(leg[2]), self.scaled.point(source, leg[2])) {
                 let p = p + self.hip_offset(leg[0], source, bodies);
@@ -225,7 +229,8 @@ impl<'a> Builder<'a> {
         (points, ankle_offsets)
     }
 
-    /// From the source's hip joint to the skeleton's, horizontally, metres: feet stand as far apart as suits the skeleton's hips.
+    /// From the source's hip joint to the skeleton's, horizontally, metres: feet stand as far apart as suits the skeleton's
+    /// hips.
     fn hip_offset(
         &self,
         hip: Slot,

@@ -132,6 +132,7 @@ fn measured(
         let mut bodies: Vec<usize> = points.map(|p| model.contact_points[*p].body).collect();
         bodies.dedup();
         let touches = contact.touches.iter().enumerate();
+        // Skating and floating are measured where the source doesn't move, for some of its contacts roll or slide.
         let stands = touches.map(|(f, touches)| *touches && source.is_still(slot, f, setting));
         Some(Contact {
             bodies,

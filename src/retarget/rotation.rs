@@ -1,13 +1,16 @@
-//! The exponential map of rotations and its derivatives (Solà, Deray, Atchuthan, "A micro Lie theory", 2018).
+//! The exponential map of rotations and its derivatives (Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in
+//! robotics", 2018, arXiv:1812.01537). A rotation vector is the axis times the angle, radians.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+/// The rotation of a rotation vector.
 pub(super) fn exp(v: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(*v)
 }
 
-/// The rotation vector, no longer than π.
+/// The rotation vector of a rotation, no longer than π.
 pub(super) fn log(q: &UnitQuaternion<f64>) -> Vector3<f64> {
+    // q and −q are the same rotation; the one with w ≥ 0 has the shorter vector.
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     let (w, v) = (q.w * sign, q.imag() * sign);
     let sine = v.norm();
@@ -20,7 +23,8 @@ pub(super) fn log(q: &UnitQuaternion<f64>) -> Vector3<f64> {
     v * factor
 }
 
-/// J with log(exp(v) exp(δ)) = v + J δ + O(δ²).
+/// J with log(exp(v) exp(δ)) = v + J δ + O(δ²): I + ½[v]× + (1/θ² − (1 + cos θ)/(2θ sin θ)) [v]×², θ = ‖v‖. The
+/// last factor is (1 − (θ/2)/tan(θ/2))/θ², and tends to 1/12.
 pub(super) fn right_jacobian_inverse(v: &Vector3<f64>) -> Matrix3<f64> {
     let cross = v.cross_matrix();
     let angle = v.norm();
@@ -38,7 +42,7 @@ pub(super) fn left_jacobian_inverse(v: &Vector3<f64>) -> Matrix3<f64> {
     right_jacobian_inverse(&-v)
 }
 
-/// The turn about +Z that is nearest to a rotation, radians.
+/// The angle about +Z of the rotation about Z that is nearest to this one, radians, −π to π.
 pub(super) fn heading(q: &UnitQuaternion<f64>) -> f64 {
     let angle = 2.0 * q.k.atan2(q.w);
     angle - (angle / std::f64::consts::TAU).round() * std::f64::consts::TAU

@@ -1,7 +1,8 @@
 //! Stage 4, seam: the loop of a clip that repeats is closed, for few clips' loops close exactly.
 //!
-//! First the cycle is found: the turn and the shift that lead from the first frame to the last. What is left between the last frame
-//! and the first one carried on by the cycle is a gap. Half of it is faded into the frames after the seam, half into those before.
+//! First the cycle is found: the turn and the shift that lead from the first frame to the last. What is left between the
+//! last frame and the first one carried on by the cycle is a gap. Half of it is faded into the frames after the seam, half
+//! into those before.
 
 use super::fade::smoothstep;
 use super::goals::Goals;
@@ -14,17 +15,18 @@ use crate::motion::Cycle;
 use crate::skeleton::Joint;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Turn of a cycle below which it goes straight, radians: 1°. Chosen: a recorded gait that is meant to be straight turns by less.
+/// Turn of a cycle below which it goes straight, radians: 1°. Chosen: a recorded gait that is meant to be straight turns by
+/// less.
 const STRAIGHT: f64 = 0.0175;
 /// Gap of a joint from which on a warning tells of it, radians: 6°. Chosen.
 const NOTICEABLE: f64 = 0.1;
 /// Time on either side of the seam over which the gap is faded, s. Chosen.
 const SPREAD: f64 = 0.25;
-/// The same as a share of the cycle; the smaller counts. With 0.1, DeepMimic's run, whose hand misses 20 cm, stepped by 4.4 cm beyond
-/// its source, with 0.15 by 2.9.
+/// The same as a share of the cycle; the smaller counts. With 0.1, DeepMimic's run, whose hand misses 20 cm, stepped by 4.4
+/// cm beyond its source, with 0.15 by 2.9.
 const SHARE: f64 = 0.15;
-/// How far closing a loop may move a point that stands without it looking as if it slid, metres. DeepMimic's run stood on its left
-/// foot alone before this was told; chosen above what closing moves a clip whose loop closes.
+/// How far closing a loop may move a point that stands without it looking as if it slid, metres. DeepMimic's run stood on
+/// its left foot alone before this was told; chosen above what closing moves a clip whose loop closes.
 const HIDES: f64 = 0.01;
 
 /// Goals whose loop is closed, if the clip repeats.
@@ -70,6 +72,7 @@ pub(super) fn close(goals: Goals, input: &Input, model: &Model) -> Closed {
     let cycle = cycle(&goals, joint_gap);
     let gap = Gap::new(&goals, &cycle, model);
     let last = goals.frames() - 1;
+    // At least one frame on either side, and at most up to the middle.
     let spread = (SPREAD * input.clip.fps).min(SHARE * last as f64);
     let seam = Seam {
         spread: (spread.round() as usize).clamp(1, last / 2),
@@ -84,16 +87,18 @@ pub(super) fn close(goals: Goals, input: &Input, model: &Model) -> Closed {
     }
 }
 
-/// The turn about Z and the shift over the ground that carry the first frame's root to the last frame's. A turn no larger than the
-/// gap that the joints leave is part of that gap: such a cycle goes straight.
+/// The turn about Z and the shift over the ground that carry the first frame's root to the last frame's. A turn no larger
+/// than the gap that the joints leave is part of that gap: such a cycle goes straight.
 fn cycle(goals: &Goals, joint_gap: f64) -> Cycle {
     let last = goals.frames().saturating_sub(1);
+    // The heading of what carries the first frame's orientation to the last one's. Roll and pitch have to close by themselves.
     let turned = goals.root_rotation(last) * goals.root_rotation(0).inverse();
     let mut angle = heading(&turned);
     if angle.abs() < STRAIGHT.max(joint_gap) {
         angle = 0.0;
     }
     let mut translation = goals.root(last) - exp(&(Vector3::z() * angle)) * goals.root(0);
+    // A cycle goes over the ground. A difference in height is part of the gap.
     translation.z = 0.0;
     Cycle {
         translation,
@@ -107,6 +112,7 @@ fn joint_gap(goals: &Goals, model: &Model) -> f64 {
     if let (Some(first), Some(last)) = (goals.guess.first(), goals.guess.last()) {
         model.difference(first, last, &mut gap);
     }
+    // The root's own difference is the cycle's step.
     let joints = model.joints().skip(1);
     let angle = |joint: &Joint| {
         gap[joint.dof..joint.dof + joint.kind.nv()]
@@ -179,6 +185,7 @@ impl Gap {
         for (rotation, by) in goals.rotations[f].iter_mut().zip(&self.turns) {
             *rotation *= exp(&(by * part));
         }
+        // The root's position is in world axes; all other coordinates are relative and need no turning.
         let mut step: Vec<f64> = self.joints.iter().map(|x| x * part).collect();
         let shift = turn * vector(&self.joints, 0) * part;
         step[..3].copy_from_slice(shift.as_slice());
@@ -192,6 +199,7 @@ fn fade_out(mut goals: Goals, gap: &Gap, seam: &Seam, model: &Model) -> Goals {
     // The gap is seen from the last frame; in the first, the cycle's turn hasn't happened yet.
     let before_the_turn = gap.turn.inverse();
     for away in 0..=seam.spread {
+        // Both halves meet at the seam, and are gone just beyond the spread.
         let left = 1.0 - away as f64 / (seam.spread + 1) as f64;
         let half = 0.5 * smoothstep(left);
         gap.apply(&mut goals, seam.last - away, half, &here, model);

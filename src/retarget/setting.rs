@@ -4,8 +4,8 @@ use super::limbs::FEET;
 use crate::clip::{Clip, LoopMode};
 use crate::skeleton::Skeleton;
 
-/// Rate and loop of a clip, and sizes of the skeleton that it is carried onto. Thresholds of contact are in leg lengths and seconds,
-/// so that they mean the same for every figure and rate.
+/// Rate and loop of a clip, and sizes of the skeleton that it is carried onto. Thresholds of contact are in leg lengths and
+/// seconds, so that they mean the same for every figure and rate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
     /// Frames per second.

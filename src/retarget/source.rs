@@ -1,5 +1,5 @@
-//! The source in the skeleton's size, and when its feet and hands are on the ground: what the result is measured against. Nothing
-//! here depends on the goals that the solver is given.
+//! The source in the skeleton's size, and when its feet and hands are on the ground: what the result is measured against.
+//! Nothing here depends on the goals that the solver is given.
 
 use super::anchor::SourceContact;
 use super::frames;
@@ -20,8 +20,8 @@ const ENDS: [(Slot, Option<Slot>); 4] = [
     (Slot::LeftHand, None),
     (Slot::RightHand, None),
 ];
-/// Heights of a wrist and of the ends of fingers on the ground, beyond those that [`contact`] allows a foot, leg lengths. Chosen: a
-/// wrist is above its palm, and fingertips are where the rig's last joint is.
+/// Heights of a wrist and of the ends of fingers on the ground, beyond those that [`contact`] allows a foot, leg lengths.
+/// Chosen: a wrist is above its palm, and fingertips are where the rig's last joint is.
 const PALM: f64 = 0.02;
 const FINGERTIP: f64 = -0.03;
 /// Factor of the leg length by which a hand's speed and height are judged. Chosen: hands roll and slide where feet stand still.
@@ -30,8 +30,8 @@ const HAND_LENGTH: f64 = 2.0;
 const LIKE_REST: f64 = 0.08;
 /// Share of frames in which a joint may be below its level: recordings have outliers. Chosen, as in [`contact`].
 const QUANTILE: f64 = 0.05;
-/// Heights of a rest pose's lowest joint between which it stands on z = 0, leg lengths. Chosen: toes' joints are up to a shoe above
-/// the sole.
+/// Heights of a rest pose's lowest joint between which it stands on z = 0, leg lengths. Chosen: toes' joints are up to a
+/// shoe above the sole.
 const STANDS: [f64; 2] = [-0.03, 0.15];
 /// Speed below which a joint of the source is still, leg lengths per second. Chosen: 7 cm/s for a leg of 0.9 m.
 const STILL: f64 = 0.08;
@@ -86,8 +86,8 @@ impl Source {
         source
     }
 
-    /// Mean height of the ankles in the rest pose, metres, if the pose stands: its lowest foot joint is near z = 0, and its ankles are
-    /// level.
+    /// Mean height of the ankles in the rest pose, metres, if the pose stands: its lowest foot joint is near z = 0, and its
+    /// ankles are level.
     fn ankle_at_rest(&self, clip: &Clip, map: &HumanoidMap, scale: f64, leg: f64) -> Option<f64> {
         let world = clip.rest_world();
         let feet = [Slot::LeftFoot, Slot::RightFoot].map(|slot| map.joint(slot));
@@ -95,6 +95,7 @@ impl Source {
         let mut in_foot = vec![false; world.len()];
         let mut lowest = f64::INFINITY;
         for (j, joint) in clip.joints.iter().enumerate() {
+            // Joints come after their parents; whatever hangs on an ankle is part of the foot.
             let below = joint.parent.is_some_and(|p| p < j && in_foot[p]);
             in_foot[j] = below || j == left || j == right;
             if in_foot[j] {
@@ -102,6 +103,7 @@ impl Source {
             }
         }
         let heights = [left, right].map(|j| world[j].translation.z * scale);
+        // A rest pose in mid-stride has one foot in the air, and doesn't tell.
         let level = (heights[0] - heights[1]).abs() < LIKE_REST * leg;
         let stands = (STANDS[0]..STANDS[1]).contains(&lowest) && level;
         stands.then_some((heights[0] + heights[1]) / 2.0)
@@ -150,13 +152,14 @@ impl Source {
             let points: Vec<Vec<Vector3<f64>>> = path.iter().map(|p| vec![*p]).collect();
             contact::detect_above(&points, floor, setting.fps, size, setting.loop_mode)
         };
+        // Heel or toes are enough: a foot rolls from one to the other.
         let each: Vec<Vec<bool>> = paths.iter().map(stands).collect();
         let any = |f: usize| each.iter().any(|stands| stands[f]);
         Some((0..self.frames).map(any).collect())
     }
 
-    /// The paths of what of a hand can touch the ground, lowered to where its skin is: fingertips, or the wrist of a hand without
-    /// fingers.
+    /// The paths of what of a hand can touch the ground, lowered to where its skin is: fingertips, or the wrist of a hand
+    /// without fingers.
     fn hand_paths(&self, hand: usize, wrist: &[Vector3<f64>], leg: f64) -> Vec<Vec<Vector3<f64>>> {
         let tips = self.tips(hand);
         if tips.is_empty() {
@@ -166,8 +169,8 @@ impl Source {
         tips.map(|path| lowered(path, FINGERTIP * leg)).collect()
     }
 
-    /// The paths of a foot's ankle and toes, lowered so that they are at the ground's height where the foot stands. Toes are taken to
-    /// be half as high as the ankle.
+    /// The paths of a foot's ankle and toes, lowered so that they are at the ground's height where the foot stands. Toes are
+    /// taken to be half as high as the ankle.
     fn foot_paths(
         &self,
         foot: Slot,
@@ -177,6 +180,7 @@ impl Source {
     ) -> Vec<Vec<Vector3<f64>>> {
         let leg = setting.leg;
         let height = self.ankle.unwrap_or(setting.ankle);
+        // The clip's own lowest level counts before the rest pose's, for soles of characters sink in or float.
         let mut paths = vec![lowered(ankle, level(ankle, floor + height, leg) - floor)];
         let toes = ENDS.iter().find(|e| e.0 == foot).and_then(|e| e.1);
         if let Some(path) = toes.and_then(|toes| self.points.get(&toes)) {
@@ -209,8 +213,8 @@ fn lowered(path: &[Vector3<f64>], by: f64) -> Vec<Vector3<f64>> {
     path.iter().map(|p| p - Vector3::z() * by).collect()
 }
 
-/// Height of a joint when its foot stands, metres: its lowest level in the clip, or the one `expected` from the rest pose where the
-/// lowest is far from that, as in a clip in which the foot never comes down.
+/// Height of a joint when its foot stands, metres: its lowest level in the clip, or the one `expected` from the rest pose
+/// where the lowest is far from that, as in a clip in which the foot never comes down.
 fn level(path: &[Vector3<f64>], expected: f64, leg: f64) -> f64 {
     let mut heights: Vec<f64> = path.iter().map(|p| p.z).collect();
     heights.sort_by(f64::total_cmp);

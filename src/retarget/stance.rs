@@ -1,7 +1,9 @@
-//! Stage 5, stance: when points of feet and hands stand on the ground, and where, and the goals of feet and hands moved along.
+//! Stage 5, stance: when points of feet and hands stand on the ground, and where, and the goals of feet and hands moved
+//! along.
 //!
-//! Feet stand where they are low and slow themselves, hands where the source's do. A point that stands becomes an [`Anchor`] in each
-//! frame of its stance, at one place on the ground. The limb's targets are moved so that its standing points are there.
+//! Feet stand where they are low and slow themselves, hands where the source's do. A point that stands becomes an [`Anchor`]
+//! in each frame of its stance, at one place on the ground. The limb's targets are moved so that its standing points are
+//! there.
 
 mod foothold;
 mod held;
@@ -46,6 +48,7 @@ pub(super) fn plant(
             touches: believed(contacts, effector, seam).map(|flags| timeline.repeat(&flags)),
         };
         let held = held::held(model, &limb, setting);
+        // From the points that stand to how the whole limb moves, and back to the frames of the goals.
         let own: Vec<_> = goals.points.iter().map(|p| p[effector.keypoint]).collect();
         let shifts = shift::shifts(&held, &timeline.extend(&own), setting.fps);
         let own = held.iter().zip(&shifts).skip(timeline.margin);
@@ -61,8 +64,8 @@ pub(super) fn plant(
     }
 }
 
-/// The source's contact of a limb as far as it decides when the limb stands, by frame: a hand's everywhere; a foot's only where closing
-/// a seam moved the foot so far that its own speed doesn't tell any more.
+/// The source's contact of a limb as far as it decides when the limb stands, by frame: a hand's everywhere; a foot's only
+/// where closing a seam moved the foot so far that its own speed doesn't tell any more.
 fn believed(
     contacts: &[SourceContact],
     effector: &EndEffector,

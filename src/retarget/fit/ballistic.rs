@@ -1,8 +1,8 @@
 //! Free fall: while nothing touches the ground, the centre of mass follows a parabola.
 //!
-//! A character of other proportions, or an animator's sense of time, makes flights that no gravity makes. Here the centre of mass goes
-//! from where it left the ground to where it comes down again along c(t) = c₀ + v t − ½ g t², in the time that the source takes. The
-//! body is shifted along with it as a whole.
+//! A character of other proportions, or an animator's sense of time, makes flights that no gravity makes. Here the centre of
+//! mass goes from where it left the ground to where it comes down again along c(t) = c₀ + v t − ½ g t², in the time that the
+//! source takes. The body is shifted along with it as a whole.
 
 use super::span::Flight;
 use super::trajectory::{Trajectory, share};
@@ -13,8 +13,8 @@ use crate::retarget::model::Model;
 use crate::skeleton::GRAVITY;
 use nalgebra::{Point3, Vector3};
 
-/// A flight falls at least half as fast as it should: slower ones are steps with feet that float, or slow motion. So it is off its
-/// parabola by at most this share of the height to which the flight rises …
+/// A flight falls at least half as fast as it should: slower ones are steps with feet that float, or slow motion. So it is
+/// off its parabola by at most this share of the height to which the flight rises …
 const SLOWEST: f64 = 0.5;
 /// … and by no more than this in any case, leg lengths. Chosen, as are the others …
 const FARTHEST: f64 = 0.35;
@@ -50,6 +50,7 @@ pub(super) fn shifts(trajectory: &Trajectory, flights: &[Flight]) -> Vec<Option<
             continue;
         };
         for (index, shift) in with_leads(flight, &off, trajectory.fps) {
+            // A flight over the seam is seen from its own cycle; frames are in the first.
             if let Some((n, f)) = trajectory.locate(index) {
                 let back = trajectory.offset(n).rotation.inverse();
                 let by = back * shift.by;
@@ -60,8 +61,8 @@ pub(super) fn shifts(trajectory: &Trajectory, flights: &[Flight]) -> Vec<Option<
     shifts
 }
 
-/// From the frame before a flight to the one after it: how far the centre of mass is from its parabola, metres; `None` if so far that
-/// the flight is none.
+/// From the frame before a flight to the one after it: how far the centre of mass is from its parabola, metres; `None` if so
+/// far that the flight is none.
 pub(super) fn off_parabola(
     trajectory: &Trajectory,
     (a, b): (i64, i64),
@@ -84,6 +85,7 @@ pub(super) fn off_parabola(
     let leg = trajectory.model.skeleton.leg_length();
     // The height above the chord of a flight of this duration: g T²/8.
     let rise = GRAVITY * duration * duration / 8.0;
+    // How far off is still the same flight in another time or size, and not another motion.
     let most = (SLOWEST * rise).min(FARTHEST * leg).max(CLOSE * leg);
     let farthest = off.iter().map(Vector3::norm).fold(0.0, f64::max);
     (farthest <= most).then_some(off)
@@ -94,6 +96,7 @@ fn with_leads(flight: &Flight, off: &[Vector3<f64>], fps: f64) -> Vec<(i64, Flig
     let last = off.len() - 1;
     let shift = |by, flies| FlightShift { by, flies };
     let leads = flight.leads(fps).into_iter().map(|lead| {
+        // Both ends of a flight are on the ground, so the shift of the frame next to it is the speed that is taken up.
         let next = [off[1], off[last - 1]][lead.end];
         (lead.index, shift(next * lead.share, false))
     });

@@ -1,28 +1,39 @@
-//! A symmetric positive definite system whose unknowns come in equal blocks, each coupled to the next two.
+//! A symmetric positive definite system whose unknowns come in equal blocks, each coupled to the next two, and its Cholesky
+//! factor.
+//!
+//! A block is a frame, and its unknowns are the degrees of freedom. Goals make the blocks on the diagonal, which are dense;
+//! accelerations make the couplings, in which each degree of freedom meets only itself or those of the same joint. The
+//! factor fills in within the band only, so time and memory grow with the number of frames, not with its square.
 
-/// Most that a column of a coupling is to the right or the left of its row.
+use super::tile::{TALL, WIDE, dot, subtract_product, widely};
+
+/// Most that a column of a coupling is to the right or the left of its row: a ball joint has three degrees of freedom.
 const BESIDE: usize = 2;
-/// Share of the right side of [`Factor::solve_ends`] that is nothing beside it.
+/// Share of the largest number on the right side of [`Factor::solve_ends`] below which others are taken to be zero. Chosen
+/// far below what a step of the solver has to be exact to.
 const NOTHING: f64 = 1e-10;
-/// Numbers of a coupling's row.
+/// Numbers in a coupling's row.
 const BAND: usize = 2 * BESIDE + 1;
 
-/// Blocks are row-major; block row `f` holds the `n × n` diagonal and the couplings to `f + 1` and `f + 2`, which are
-/// bands.
+/// The system: block row `f` has the `n × n` block on the diagonal and the couplings to the blocks `f + 1` and `f + 2`.
 pub(super) struct Pentadiagonal {
+    /// Unknowns of a block.
     pub n: usize,
+    /// Blocks.
     pub count: usize,
-    /// Only the lower triangle of each is read.
+    /// The blocks on the diagonal one after the other, row by row. Only the lower triangle of each is read.
     pub diagonal: Vec<f64>,
-    /// Row block f, column block f + 1.
+    /// Row block f, column block f + 1, by row: the columns beside the row's own.
     next: Vec<[f64; BAND]>,
     /// Row block f, column block f + 2.
     second: Vec<[f64; BAND]>,
 }
 
-/// The triangle U with UᵀU the system, block row by block row: n rows of [`Factor::stride`] numbers, in which are U's
-/// block on the diagonal (what is left of its diagonal means nothing), its couplings to the next block and to the one
-/// after it, and zeros.
+/// The upper triangle U with UᵀU the system.
+///
+/// It lies block row by block row, n rows of `stride` numbers each: U's block on the diagonal (what is below the diagonal
+/// means nothing), its couplings to the next block and to the one after it, and zeros. So elimination, products and
+/// solutions all run along rows, which made retargeting half again as fast as adding rows to rows.
 pub(super) struct Factor {
     n: usize,
     count: usize,
@@ -30,7 +41,7 @@ pub(super) struct Factor {
     rows: Vec<f64>,
 }
 
-/// Numbers of a block's row in a [`Factor`].
+/// Numbers of a row in a [`Factor`]: three blocks, and padding so that tiles of eight columns never end beyond the row.
 fn stride(n: usize) -> usize {
     (3 * n + WIDE).next_multiple_of(WIDE)
 }
@@ -41,6 +52,7 @@ impl Pentadiagonal {
         8 * n * (n + 2 * BAND)
     }
 
+    /// A system of zeros.
     pub fn new(n: usize, count: usize) -> Pentadiagonal {
         let couplings = || vec![[0.0; BAND]; n * count];
         Pentadiagonal {
@@ -52,6 +64,7 @@ impl Pentadiagonal {
         }
     }
 
+    /// Sets all to zero.
     pub fn clear(&mut self) {
         self.diagonal.fill(0.0);
         self.next.fill([0.0; BAND]);
@@ -67,7 +80,7 @@ impl Pentadiagonal {
         couplings[f * self.n + row][column + BESIDE - row] += value;
     }
 
-    /// The mean of the diagonal, times `factor`.
+    /// The mean of the whole diagonal, times `factor`.
     pub fn mean_times(&self, factor: f64) -> f64 {
         let places = (0..self.count).flat_map(|f| self.places(f));
         let total: f64 = places.map(|at| self.diagonal[at]).sum();
@@ -81,17 +94,13 @@ impl Pentadiagonal {
     }
 }
 
-/// Rows and columns of the result that [`subtract_product`] holds in registers.
-const TALL: usize = 4;
-const WIDE: usize = 8;
-
 impl Factor {
     /// Memory of a block row, bytes.
     pub fn bytes(n: usize) -> usize {
         8 * n * stride(n)
     }
 
-    /// Room for the factor of such systems.
+    /// Memory for the factor of such systems.
     pub fn new(n: usize, count: usize) -> Factor {
         let stride = stride(n);
         Factor {
@@ -102,7 +111,7 @@ impl Factor {
         }
     }
 
-    /// Factors the system with `added` to its diagonal; `false` when that isn't positive definite.
+    /// Factors the system with `added` to its diagonal; `false` if that isn't positive definite.
     pub fn set(&mut self, system: &Pentadiagonal, added: f64) -> bool {
         widely(
             #[inline(always)]
@@ -110,9 +119,11 @@ impl Factor {
         )
     }
 
+    /// Block by block: the block row is eliminated, and what that takes from the two block rows below it is subtracted.
     #[inline(always)]
     fn set_here(&mut self, system: &Pentadiagonal, added: f64) -> bool {
         let (n, stride, size) = (self.n, self.stride, self.n * self.stride);
+        // All is loaded first, for the elimination of a block row subtracts from the two below it.
         for f in 0..self.count {
             self.load(system, f, added);
         }
@@ -126,9 +137,11 @@ impl Factor {
                 stride,
                 from: here,
             };
+            // The next block row: its own block and its coupling to the one after it, which is this row's second.
             if let Some(next) = after.get_mut(..size) {
                 product.subtract(next, n, 2 * n);
             }
+            // The one after it: its own block alone, for nothing couples this row to anything further.
             if let Some(second) = after.get_mut(size..2 * size) {
                 product.subtract(second, 2 * n, n);
             }
@@ -144,6 +157,7 @@ impl Factor {
         rows.fill(0.0);
         let lower = &system.diagonal[f * n * n..(f + 1) * n * n];
         for (i, row) in rows.chunks_exact_mut(stride).enumerate() {
+            // The upper triangle is the lower one's mirror image.
             (i..n).for_each(|j| row[j] = lower[j * n + i]);
             row[i] += added;
             let columns = i.saturating_sub(BESIDE)..n.min(i + BESIDE + 1);
@@ -170,8 +184,9 @@ impl Factor {
         );
     }
 
-    /// The same for a right side that is zero but in the first and last two blocks. What has become small beside it is
-    /// taken to be zero.
+    /// The same for a right side that is zero except in the first and the last two blocks, as around the seam of a cycle.
+    /// Its influence decays along the band, so both substitutions stop where what they carry on has become [`NOTHING`]
+    /// beside it.
     pub fn solve_ends(&self, x: &mut [f64]) {
         let small = NOTHING * x.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let n = self.n;
@@ -180,15 +195,18 @@ impl Factor {
         widely(
             #[inline(always)]
             || {
+                // From the first blocks forward until what is carried on has died away …
                 let mut reached = 0;
                 while reached < last && !is_small(x, reached) {
                     self.forward(x, reached);
                     reached += 1;
                 }
+                // … the blocks between are zero, and those at the other end have a right side of their own.
                 x[reached * n..last * n].fill(0.0);
                 for f in last..self.count {
                     self.forward(x, f);
                 }
+                // Back from the end until that has died away, then on from where the first blocks reached.
                 let mut f = self.count;
                 while f > 0 {
                     f -= 1;
@@ -201,7 +219,7 @@ impl Factor {
         );
     }
 
-    /// Uᵀ⁻¹ of block `f`, taken from what follows as well.
+    /// Forward substitution of block `f`: x ← Uᵀ⁻¹ x, subtracted from what follows as well.
     #[inline(always)]
     fn forward(&self, x: &mut [f64], f: usize) {
         let (n, stride) = (self.n, self.stride);
@@ -210,6 +228,7 @@ impl Factor {
         for (i, row) in rows.take(n).enumerate() {
             let (done, rest) = x.split_at_mut(i + 1);
             done[i] /= row[i];
+            // Beyond its two couplings a row has nothing; the last rows end with the system.
             let width = (2 * n + BESIDE).min(rest.len());
             for (x, u) in rest[..width].iter_mut().zip(&row[i + 1..]) {
                 *x = u.mul_add(-done[i], *x);
@@ -217,7 +236,7 @@ impl Factor {
         }
     }
 
-    /// U⁻¹ of block `f`.
+    /// Back substitution of block `f`: x ← U⁻¹ x.
     #[inline(always)]
     fn back(&self, x: &mut [f64], f: usize) {
         let (n, stride) = (self.n, self.stride);
@@ -231,34 +250,14 @@ impl Factor {
     }
 }
 
-/// Runs `work` with wide instructions where the processor has them; the bits are the same.
-fn widely<R>(work: impl FnOnce() -> R) -> R {
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2,fma")]
-        fn avx2<R>(work: impl FnOnce() -> R) -> R {
-            work()
-        }
-        if has_avx() {
-            // SAFETY: the processor has the features that the function is compiled for.
-            return unsafe { avx2(work) };
-        }
-    }
-    work()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn has_avx() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
-}
-
-/// Cholesky elimination of a block row: U and Uᵀ⁻¹ times the couplings, in place.
+/// Cholesky elimination of a block row, in place: its block becomes U, its couplings Uᵀ⁻¹ times themselves; `false` if a
+/// pivot isn't positive. A strip of four rows at a time: first what all rows above take from it, tile by tile, then the four
+/// rows by themselves.
 #[inline(always)]
 fn eliminate(rows: &mut [f64], n: usize, stride: usize) -> bool {
     for top in (0..n).step_by(TALL) {
         let height = TALL.min(n - top);
-        // The second coupling ends beside the diagonal.
+        // The second coupling has nothing further right than this.
         let end = 2 * n + (top + height + BESIDE).min(n);
         let (done, rest) = rows.split_at_mut(top * stride);
         let strip = &mut rest[..height * stride];
@@ -274,12 +273,14 @@ fn eliminate(rows: &mut [f64], n: usize, stride: usize) -> bool {
         for i in 0..height {
             let (above, below) = strip.split_at_mut((i + 1) * stride);
             let row = &mut above[i * stride + top + i..i * stride + end];
+            // A pivot that isn't positive, or is no number: the system isn't positive definite.
             let pivot = row[0];
             if pivot.is_nan() || pivot <= 0.0 {
                 return false;
             }
             let inverse = 1.0 / pivot.sqrt();
             row.iter_mut().for_each(|x| *x *= inverse);
+            // What this row takes from those below it in the strip.
             for (k, other) in below.chunks_exact_mut(stride).enumerate() {
                 let factor = -row[k + 1];
                 let other = &mut other[top + i..end];
@@ -292,7 +293,7 @@ fn eliminate(rows: &mut [f64], n: usize, stride: usize) -> bool {
     true
 }
 
-/// What an eliminated block row takes from those it is coupled to.
+/// An eliminated block row, whose products are taken from the block rows that it is coupled to.
 struct Product<'a> {
     n: usize,
     stride: usize,
@@ -300,8 +301,8 @@ struct Product<'a> {
 }
 
 impl Product<'_> {
-    /// Takes from the first `width` columns of `to` the transpose of the `n` columns from `first` on times the `width`
-    /// columns from there on, right of the diagonal.
+    /// Subtracts AᵀB from the first `width` columns of `to`, right of the diagonal: A is the `n` columns from `first` on, B
+    /// the `width` columns from there on.
     #[inline(always)]
     fn subtract(&self, to: &mut [f64], first: usize, width: usize) {
         let (n, stride) = (self.n, self.stride);
@@ -309,7 +310,7 @@ impl Product<'_> {
             let height = TALL.min(n - top);
             let strip = &mut to[top * stride..(top + height) * stride];
             for column in (top / WIDE * WIDE..width).step_by(WIDE) {
-                // Nothing is that far right in the second coupling.
+                // Rows above this one have nothing that far right in the second coupling.
                 let from = (first + column).saturating_sub(2 * n + BESIDE);
                 let rows = &self.from[from.min(n) * stride..];
                 let (a, b) = (rows.get(first + top..), rows.get(first + column..));
@@ -321,172 +322,5 @@ impl Product<'_> {
     }
 }
 
-/// c −= aᵀ b for `height` rows and [`WIDE`] columns of c, all with rows of `stride` numbers.
-#[inline(always)]
-fn subtract_product(c: &mut [f64], (a, b): (&[f64], &[f64]), stride: usize, height: usize) {
-    match height {
-        TALL => subtract_tile::<TALL>(c, a, b, stride),
-        3 => subtract_tile::<3>(c, a, b, stride),
-        2 => subtract_tile::<2>(c, a, b, stride),
-        _ => subtract_tile::<1>(c, a, b, stride),
-    }
-}
-
-#[inline(always)]
-fn subtract_tile<const H: usize>(c: &mut [f64], a: &[f64], b: &[f64], stride: usize) {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx() {
-        // SAFETY: the processor has the features that the function is compiled for.
-        return unsafe { subtract_tile_avx::<H>(c, a, b, stride) };
-    }
-    let mut sums = [[0.0; WIDE]; H];
-    for (a, b) in tile_rows::<H>(a, b, stride) {
-        for (sums, a) in sums.iter_mut().zip(a) {
-            for (sum, b) in sums.iter_mut().zip(b) {
-                *sum = a.mul_add(*b, *sum);
-            }
-        }
-    }
-    subtract_sums(c, &sums, stride);
-}
-
-/// The same; the compiler doesn't find these instructions by itself.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-#[inline]
-fn subtract_tile_avx<const H: usize>(c: &mut [f64], a: &[f64], b: &[f64], stride: usize) {
-    use std::arch::x86_64::{__m256d, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_setr_pd};
-    let mut sums = [[_mm256_set1_pd(0.0); 2]; H];
-    for (a, b) in tile_rows::<H>(a, b, stride) {
-        let halves = [
-            _mm256_setr_pd(b[0], b[1], b[2], b[3]),
-            _mm256_setr_pd(b[4], b[5], b[6], b[7]),
-        ];
-        for (sums, a) in sums.iter_mut().zip(a) {
-            let a = _mm256_set1_pd(*a);
-            for (sum, half) in sums.iter_mut().zip(halves) {
-                *sum = _mm256_fmadd_pd(a, half, *sum);
-            }
-        }
-    }
-    // SAFETY: eight doubles are as large as two vectors of four, and any bits of them are doubles.
-    let sums = sums.map(|row| unsafe { std::mem::transmute::<[__m256d; 2], [f64; WIDE]>(row) });
-    subtract_sums(c, &sums, stride);
-}
-
-#[inline(always)]
-fn tile_rows<'a, const H: usize>(
-    a: &'a [f64],
-    b: &'a [f64],
-    stride: usize,
-) -> impl Iterator<Item = (&'a [f64; H], &'a [f64; WIDE])> {
-    let pairs = a.chunks(stride).zip(b.chunks(stride));
-    pairs.map_while(|(a, b)| Some((a.first_chunk()?, b.first_chunk()?)))
-}
-
-#[inline(always)]
-fn subtract_sums(c: &mut [f64], sums: &[[f64; WIDE]], stride: usize) {
-    for (c, sums) in c.chunks_mut(stride).zip(sums) {
-        for (c, sum) in c.iter_mut().zip(sums) {
-            *c -= sum;
-        }
-    }
-}
-
-/// Sum of products in eight strands, which the compiler can keep side by side.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; WIDE];
-    let (wide_a, wide_b) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
-    let rest = wide_a.remainder().iter().zip(wide_b.remainder());
-    let mut sum = 0.0;
-    for (x, y) in rest {
-        sum = x.mul_add(*y, sum);
-    }
-    for (x, y) in wide_a.zip(wide_b) {
-        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
-            *sum = x.mul_add(*y, *sum);
-        }
-    }
-    sums.iter().sum::<f64>() + sum
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{DMatrix, DVector};
-
-    /// A sparse J of the band's shape, its JᵀJ + I as blocks and dense.
-    fn system(n: usize, count: usize) -> (Pentadiagonal, DMatrix<f64>) {
-        let mut seed = 7_u64;
-        let mut random = || {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (seed >> 33) as f64 / (1_u64 << 31) as f64 - 0.5
-        };
-        let mut dense = DMatrix::<f64>::identity(n * count, n * count);
-        for f in 0..count {
-            let a = DMatrix::from_fn(2 * n, n, |_, _| random());
-            let mut block = dense.view_mut((f * n, f * n), (n, n));
-            block += a.transpose() * a;
-        }
-        for f in 1..count.saturating_sub(1) {
-            for i in 0..n {
-                let mut row = DVector::<f64>::zeros(n * count);
-                for k in (i / 3 * 3)..n.min(i / 3 * 3 + 3) {
-                    for g in f - 1..=f + 1 {
-                        row[g * n + k] = random();
-                    }
-                }
-                dense += &row * row.transpose();
-            }
-        }
-        let mut blocks = Pentadiagonal::new(n, count);
-        for (f, r, c) in places(n, count) {
-            blocks.diagonal[f * n * n + r * n + c] = dense[(f * n + r, f * n + c)];
-            for ahead in (1..=2).filter(|ahead| f + ahead < count && r / 3 == c / 3) {
-                let value = dense[(f * n + r, (f + ahead) * n + c)];
-                blocks.couple(f, ahead, (r, c), value);
-            }
-        }
-        (blocks, dense)
-    }
-
-    /// Every number of every block on the diagonal.
-    fn places(n: usize, count: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-        (0..count * n * n).map(move |at| (at / n / n, at / n % n, at % n))
-    }
-
-    #[test]
-    fn it_solves_what_a_dense_solver_solves() {
-        for (n, count) in [(1, 1), (3, 2), (6, 9), (34, 7), (35, 3), (3, 400)] {
-            let (blocks, dense) = system(n, count);
-            let mut factor = Factor::new(n, count);
-            let right = DVector::from_fn(n * count, |i, _| (i as f64 * 0.7).sin());
-            let expected = dense.clone().lu().solve(&right).unwrap();
-            let mut x = right.as_slice().to_vec();
-            assert!(factor.set(&blocks, 0.0));
-            factor.solve(&mut x);
-            let error = (DVector::from_vec(x) - expected).norm();
-            assert!(error < 1e-8, "{n} × {count}: {error}");
-            let at_ends = |i: usize| i < 2 * n || i + 2 * n >= n * count;
-            let right =
-                DVector::from_fn(n * count, |i, _| f64::from(u8::from(at_ends(i))) * right[i]);
-            let expected = dense.lu().solve(&right).unwrap();
-            let mut x = right.as_slice().to_vec();
-            factor.solve_ends(&mut x);
-            let error = (DVector::from_vec(x) - expected).norm();
-            assert!(error < 1e-7, "{n} × {count}, from the ends: {error}");
-        }
-    }
-
-    #[test]
-    fn an_indefinite_matrix_is_refused() {
-        let mut blocks = Pentadiagonal::new(2, 2);
-        blocks
-            .diagonal
-            .copy_from_slice(&[1.0, 0.0, 2.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
-        assert!(!Factor::new(2, 2).set(&blocks, 0.0));
-    }
-}
+mod tests;

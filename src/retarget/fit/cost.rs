@@ -1,7 +1,8 @@
 //! The cost of a frame: half the sum of squared residuals, with its gradient and Gauss–Newton matrix.
 //!
-//! Each residual r with weight w adds w²‖r‖²/2 to the cost, w² Jᵀr to the gradient and w² JᵀJ to the matrix, J being its derivative
-//! by the frame's degrees of freedom. Second derivatives of r are left out, as Gauss and Newton do: they vanish where goals are met.
+//! Each residual r with weight w adds w²‖r‖²/2 to the cost, w² Jᵀr to the gradient and w² JᵀJ to the matrix, J being its
+//! derivative by the frame's degrees of freedom. Second derivatives of r are left out, as Gauss and Newton do: they vanish
+//! where goals are met.
 
 use super::weight;
 use crate::retarget::anchor::Anchor;
@@ -12,8 +13,8 @@ use crate::retarget::rotation::{log, right_jacobian_inverse};
 use crate::skeleton::{Joint, JointKind, limits};
 use nalgebra::Vector3;
 
-/// How far inside of its limits a coordinate is kept, radians or metres. Chosen: what presses against a limit ends a little beyond the
-/// margin and still inside of the limit.
+/// How far inside of its limits a coordinate is kept, radians or metres. Chosen: what presses against a limit ends a little
+/// beyond the margin and still inside of the limit.
 const LIMIT_MARGIN: f64 = 0.01;
 
 /// What a trajectory is fitted to, in the sense of least squares.
@@ -48,10 +49,12 @@ impl NormalEquations<'_> {
     /// Adds the residual `r` with its derivative, the degrees of freedom ascending, both times `weight`; returns its cost.
     fn add(&mut self, columns: &[(usize, Vector3<f64>)], r: &Vector3<f64>, weight: f64) -> f64 {
         let n = self.gradient.len();
+        // Residual and derivative both carry the weight, so gradient and matrix have its square.
         let square = weight * weight;
         for (i, (row, a)) in columns.iter().enumerate() {
             let a = a * square;
             self.gradient[*row] += a.dot(r);
+            // Degrees of freedom ascend, so this is the lower triangle.
             for (column, b) in &columns[..=i] {
                 self.matrix[row * n + column] += a.dot(b);
             }
@@ -67,8 +70,8 @@ impl NormalEquations<'_> {
         0.5 * weight * weight * r * r
     }
 
-    /// The same for a residual of a ball joint whose first degree of freedom is `dof` and whose rotation vector is `v`: the residual
-    /// changes by the `rows` of the inverse right Jacobian at `v`.
+    /// The same for a residual of a ball joint whose first degree of freedom is `dof` and whose rotation vector is `v`: the
+    /// residual changes by the `rows` of the inverse right Jacobian at `v`.
     fn add_rotation(
         &mut self,
         dof: usize,
@@ -78,6 +81,7 @@ impl NormalEquations<'_> {
         rows: [bool; 3],
     ) -> f64 {
         let mut derivative = right_jacobian_inverse(v);
+        // A component within its limits is no residual.
         for (i, row) in rows.iter().enumerate() {
             if !row {
                 derivative.row_mut(i).fill(0.0);
@@ -128,6 +132,7 @@ impl LeastSquares<'_> {
 
     /// The Jacobian of the world point `p` of `body`.
     fn levers(&self, body: usize, pose: &Pose, p: &Vector3<f64>, columns: &mut Columns) {
+        // Only what is between the root and the body moves the point: a chain has a third of all degrees of freedom.
         columns.clear();
         let lever = |dof: &usize| (*dof, self.model.lever(pose, *dof, p));
         columns.extend(self.model.chains[body].iter().map(lever));
@@ -150,8 +155,8 @@ impl LeastSquares<'_> {
         cost
     }
 
-    /// Angles of orientations from their targets: r = log(goal⁻¹ R), seen from the body. A rate of a degree of freedom about the world
-    /// axis a turns the body by Rᵀa in its own frame, which the inverse right Jacobian takes to the change of r.
+    /// Angles of orientations from their targets: r = log(goal⁻¹ R), seen from the body. A rate of a degree of freedom about
+    /// the world axis a turns the body by Rᵀa in its own frame, which the inverse right Jacobian takes to the change of r.
     fn orientations(
         &self,
         f: usize,
@@ -164,6 +169,7 @@ impl LeastSquares<'_> {
         for (turn, goal) in goals {
             let rotation = pose.bodies[turn.body].rotation;
             let r = log(&(goal.inverse() * rotation));
+            // ∂r = Jr⁻¹(r) · Rᵀa for each axis a that turns the body. Translations don't.
             let into_body = rotation.inverse().to_rotation_matrix();
             let derivative = right_jacobian_inverse(&r) * into_body.matrix();
             let turning = self.model.chains[turn.body]
@@ -189,6 +195,7 @@ impl LeastSquares<'_> {
             let point = &self.model.contact_points[anchor.point];
             let at = point.place(&pose.bodies);
             self.levers(point.body, pose, &at, columns);
+            // The hold fades in and out, so that a stance begins and ends without a jerk.
             cost += to.add(columns, &(at - anchor.at), weight::STANCE * anchor.hold);
         }
         cost
@@ -200,6 +207,7 @@ impl LeastSquares<'_> {
         for point in &self.model.contact_points {
             let at = point.place(&pose.bodies);
             let below = at.z - point.radius;
+            // One-sided: half a parabola, whose slope is continuous at the ground.
             if below < 0.0 {
                 self.levers(point.body, pose, &at, columns);
                 columns
@@ -221,6 +229,7 @@ impl LeastSquares<'_> {
             let [one, other] = overlap.bodies;
             let [p, q] = &overlap.points;
             self.levers(one, pose, p, columns);
+            // The depth changes by how one point moves against the other. What moves both alike (the root) cancels.
             for dof in &self.model.chains[other] {
                 let lever = -self.model.lever(pose, *dof, q);
                 match columns.iter_mut().find(|(own, _)| own == dof) {
@@ -228,7 +237,9 @@ impl LeastSquares<'_> {
                     None => columns.push((*dof, lever)),
                 }
             }
+            // The lower triangle needs ascending degrees of freedom.
             columns.sort_unstable_by_key(|(dof, _)| *dof);
+            // Only motion along the normal parts the two; sliding past each other is free.
             for (_, lever) in columns.iter_mut() {
                 *lever = Vector3::new(lever.dot(&overlap.normal), 0.0, 0.0);
             }
@@ -250,7 +261,8 @@ impl LeastSquares<'_> {
                         quaternion(guess, joint.qpos).inverse() * quaternion(qpos, joint.qpos);
                     let off = log(&turn);
                     cost += to.add_rotation(joint.dof, &off, &off, weight::GUESS, [true; 3]);
-                    let (v, r) = outside_of_cone(joint, qpos);
+                    // Each component of the rotation vector has a range of its own, as its drives have.
+                    let (v, r) = outside_of_ranges(joint, qpos);
                     if r != Vector3::zeros() {
                         let rows = [r.x != 0.0, r.y != 0.0, r.z != 0.0];
                         cost += to.add_rotation(joint.dof, &v, &r, self.limit, rows);
@@ -272,7 +284,7 @@ impl LeastSquares<'_> {
 }
 
 /// A ball joint's rotation vector, and how far each of its components is outside of its limits, radians.
-fn outside_of_cone(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+fn outside_of_ranges(joint: &Joint, qpos: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
     let (v, _) = limits::ball(joint, qpos);
     let outside = |i: usize| {
         let range = joint.limits.get(i);

@@ -1,7 +1,8 @@
 //! Flights: where the body is in the air, and in which frame each flight begins and ends.
 //!
-//! That a body is clear of the ground is easy to see; when it stops pushing is not. So a flight may have any of several lengths, and the
-//! one counts with which the body, falling and spinning freely, changes its speed least where it leaves the ground and comes down.
+//! That a body is clear of the ground is easy to see; when it stops pushing is not. So a flight may have any of several
+//! lengths, and the one counts with which the body, falling and spinning freely, changes its speed least where it leaves the
+//! ground and comes down.
 
 use super::ballistic::{self, FlightShift};
 use super::span::Flight;
@@ -84,15 +85,17 @@ fn near_ground(trajectory: &Trajectory, low: &[f64], (from, step): (i64, i64), m
         let at = trajectory.locate(from + step * i);
         at.is_some_and(|(_, f)| low[f] > pushes && !trajectory.touches(f))
     };
+    // The body leaves the ground within a few frames; what takes longer is standing on tiptoe.
     let longest = trajectory.near();
     (0..longest.min(most)).take_while(above).count() as i64
 }
 
-/// The length of a flight: the longest whose body changes its speed hardly more at take-off and landing than that of the smoothest.
-/// `None` if no length is a free fall.
+/// The length of a flight: the longest whose body changes its speed hardly more at take-off and landing than that of the
+/// smoothest. `None` if no length is a free fall.
 ///
-/// A body that is to perform the motion gets the longest of all. It has to have the flight's spin by the time of its last push, which is
-/// before the source's speed changes: with the smoothest flight of DeepMimic's jump, survival was 0.97 instead of 1.00.
+/// A body that is to perform the motion gets the longest of all. It has to have the flight's spin by the time of its last
+/// push, which is before the source's speed changes: with the smoothest flight of DeepMimic's jump, survival was 0.97
+/// instead of 1.00.
 fn choose(trajectory: &Trajectory, flight: &Flight, com: &[Vector3<f64>]) -> Option<Flight> {
     let widest = flight.lengths().next()?.span;
     let spins = Spins::new(trajectory, widest);

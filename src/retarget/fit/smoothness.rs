@@ -7,8 +7,8 @@ use crate::retarget::rotation::{left_jacobian_inverse, right_jacobian_inverse};
 use crate::skeleton::JointKind;
 use nalgebra::{Matrix3, Vector3};
 
-/// Degrees of freedom whose second difference is one residual: the position or the orientation of the root, a ball joint, a hinge or a
-/// slide.
+/// Degrees of freedom whose second difference is one residual: the position or the orientation of the root, a ball joint, a
+/// hinge or a slide.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DofGroup {
     /// The first.
@@ -29,6 +29,7 @@ pub(super) fn dof_groups(model: &Model) -> Vec<DofGroup> {
         is_rotation,
         weight,
     };
+    // A hinge's angle is a coordinate, and weighs like a rotation although its differences subtract.
     let (linear, angular) = (weight::LINEAR_ACCELERATION, weight::ANGULAR_ACCELERATION);
     let mut groups = Vec::new();
     for joint in model.joints() {
@@ -56,8 +57,8 @@ pub(super) struct SecondDifference {
 
 /// The second difference of a group from the steps into and out of a frame (tangent vectors).
 ///
-/// With rotations, log(R₀⁻¹ R₁) changes with R₀ by minus the inverse left Jacobian and with R₁ by the inverse right one (Solà, Deray,
-/// Atchuthan, "A micro Lie theory", 2018, section II.E).
+/// With rotations, log(R₀⁻¹ R₁) changes with R₀ by minus the inverse left Jacobian and with R₁ by the inverse right one
+/// (Solà, Deray, Atchuthan, "A micro Lie theory", 2018).
 pub(super) fn second_difference(group: &DofGroup, into: &[f64], out: &[f64]) -> SecondDifference {
     let pick = |v: &[f64]| {
         Vector3::from_fn(|i, _| {
@@ -69,6 +70,7 @@ pub(super) fn second_difference(group: &DofGroup, into: &[f64], out: &[f64]) -> 
         })
     };
     let (into, out) = (pick(into), pick(out));
+    // r = log(R₁⁻¹R₂) − log(R₀⁻¹R₁), or x₀ − 2x₁ + x₂.
     let by = if group.is_rotation {
         [
             left_jacobian_inverse(&into),
@@ -86,8 +88,8 @@ pub(super) fn second_difference(group: &DofGroup, into: &[f64], out: &[f64]) -> 
 }
 
 impl SecondDifference {
-    /// Over the seam of a cycle, positions of the root in one cycle are compared with those in the next, which is turned: the root's
-    /// shift is seen from the cycle that frame `f` of `total` is in.
+    /// Over the seam of a cycle, positions of the root in one cycle are compared with those in the next, which is turned:
+    /// the root's shift is seen from the cycle that frame `f` of `total` is in.
     pub fn over_seam(
         mut self,
         group: &DofGroup,
@@ -101,10 +103,12 @@ impl SecondDifference {
         else {
             return self;
         };
+        // Into the first frame: the step before is in the cycle before, turned back here.
         if f == 0 {
             self.r = vector(out, group.dof) - turn.transpose() * vector(into, group.dof);
             self.by[0] = turn.transpose();
         }
+        // Out of the last frame: the next one is the first, carried on by the cycle's turn.
         if f + 1 == total {
             self.by[2] = *turn;
         }

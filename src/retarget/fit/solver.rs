@@ -1,8 +1,8 @@
 //! The solver: the whole trajectory in one least-squares problem.
 //!
-//! Levenberg and Marquardt's method over all frames at once or, where these are many, over one window of them after the other. A rough
-//! search over all frames comes first. Then the frames that still move are solved for again, with those around them and without the
-//! rest, until they are still.
+//! Levenberg and Marquardt's method over all frames at once or, where these are many, over one window of them after the
+//! other. A rough search over all frames comes first. Then the frames that still move are solved for again, with those
+//! around them and without the rest, until they are still.
 
 use super::banded::{Factor, Pentadiagonal};
 use super::cost::LeastSquares;
@@ -19,7 +19,8 @@ const ITERATIONS: usize = 15;
 const GAIN: f64 = 1e-3;
 /// Change of a coordinate in a step below which its frame is still, metres or radians. Chosen: a third of a millimetre.
 const STILL: f64 = 3e-4;
-/// Longest change of a coordinate in a step, radians or metres. Chosen: a longer one can carry a limb over into another way of bending.
+/// Longest change of a coordinate in a step, radians or metres. Chosen: a longer one can carry a limb over into another way
+/// of bending.
 const FARTHEST: f64 = 0.5;
 /// Time around a frame that still moves in which others are solved for with it, s. Chosen: beyond it hardly anything is felt.
 const REACH: f64 = 0.2;
@@ -27,8 +28,8 @@ const REACH: f64 = 0.2;
 const MOST_REACH: usize = 200;
 /// Damping at the start, relative to the mean diagonal. Chosen small: the guess is near.
 const DAMPING: f64 = 1e-5;
-/// Damping above which a step that gains nothing ends the search. Where limbs meet the ground or leave it within a step, a search that
-/// ended at 0.1 was left far from its end (a knee below the ground in poser's spinning clip).
+/// Damping above which a step that gains nothing ends the search. Where limbs meet the ground or leave it within a step, a
+/// search that ended at 0.1 was left far from its end (a knee below the ground in poser's spinning clip).
 const STIFF: f64 = 10.0;
 /// Factor of the damping after a step that gained …
 const ON_GAIN: f64 = 0.3;
@@ -38,8 +39,8 @@ const ON_LOSS: f64 = 30.0;
 const SEAM_ROUNDS: usize = 4;
 /// Memory for a window's equations, those of a trial, and their factor, bytes: about 1,200 frames of a humanoid. Chosen.
 const MEMORY: usize = 64 << 20;
-/// Time by which a window reaches back into the one before, so that those frames see what comes after them, s. After a second the
-/// solution over windows is within 1e-3 of the one over all frames (a test).
+/// Time by which a window reaches back into the one before, so that those frames see what comes after them, s. After a
+/// second the solution over windows is within 1e-3 of the one over all frames (a test).
 const OVERLAP: f64 = 1.0;
 /// Fewest frames in a window, whatever the skeleton.
 const SHORTEST_WINDOW: usize = 64;
@@ -68,6 +69,7 @@ impl<'a> Solver<'a> {
     /// A solver for a trajectory that repeats by `cycle`, or ends.
     pub fn new(problem: &'a LeastSquares<'a>, cycle: Option<&Cycle>) -> Solver<'a> {
         let n = problem.model.skeleton.nv;
+        // A search holds the equations, those of a trial step, and their factor.
         let frame = 2 * Pentadiagonal::bytes(n) + Factor::bytes(n);
         Solver {
             problem,
@@ -82,6 +84,7 @@ impl<'a> Solver<'a> {
     pub fn run(&self, frames: &mut [Vec<f64>]) -> usize {
         let mut most = 0;
         for window in self.windows(frames.len()) {
+            // The whole window until it gains little, and then its parts until each is still.
             let rough = self.search(frames, window, |gain, _| gain < GAIN);
             most = most.max(rough.steps);
             self.settle(frames, window, &rough.moved);
@@ -104,9 +107,10 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Goes on around frames that moved in the last step. When a part of a clip is done doesn't depend on the rest of it, so that the part
-    /// becomes the same in a longer or shorter clip.
+    /// Goes on around frames that moved in the last step. When a part of a clip is done doesn't depend on the rest of it, so
+    /// that the part becomes the same in a longer or shorter clip.
     fn settle(&self, frames: &mut [Vec<f64>], window: Window, moved: &[f64]) {
+        // At least two frames, which accelerations couple to.
         let reach = ((REACH * self.problem.fps).ceil() as usize).clamp(2, MOST_REACH);
         for part in moving(moved, reach) {
             // Both ends of a ring that lacks one frame would be that frame.
@@ -128,6 +132,7 @@ impl<'a> Solver<'a> {
         let repeats = self.cycle.is_some();
         let longest = self.longest;
         let second = (OVERLAP * self.problem.fps).ceil() as usize;
+        // At most a quarter of a window, or windows of large skeletons would hardly get on.
         let overlap = second.clamp(2, longest / 4);
         let window = move |start: usize, count: usize| Window {
             start,
@@ -141,8 +146,8 @@ impl<'a> Solver<'a> {
         along.chain(seam).filter(|window| window.count > 0)
     }
 
-    /// Levenberg and Marquardt's method over a window until `done`, which gets the relative gain of a step and the largest change of a
-    /// coordinate in it.
+    /// Levenberg and Marquardt's method over a window until `done`, which gets the relative gain of a step and the largest
+    /// change of a coordinate in it.
     fn search(
         &self,
         frames: &mut [Vec<f64>],
@@ -153,8 +158,8 @@ impl<'a> Solver<'a> {
         let (mut system, mut trial) = (new(), new());
         let mut factor = Factor::new(self.n, window.count);
         let mut cost = self.assemble(frames, &mut system);
-        // Damping falls after steps that gain, towards Gauss and Newton's step, which is best near the solution; it rises after steps that
-        // don't, towards short steps down the gradient. A rejected step keeps its equations.
+        // Damping falls after steps that gain, towards Gauss and Newton's step, which is best near the solution; it rises
+        // after steps that don't, towards short steps down the gradient. A rejected step keeps its equations.
         let mut damping = DAMPING;
         let mut search = Search {
             steps: 0,
@@ -163,6 +168,7 @@ impl<'a> Solver<'a> {
         while search.steps < ITERATIONS {
             search.steps += 1;
             let before: Vec<Vec<f64>> = window.frames().map(|f| frames[f].clone()).collect();
+            // A step that can't be solved for, that isn't finite, or that doesn't lower the cost is taken back.
             let step = system.solve(&mut factor, damping, SEAM_ROUNDS);
             let moved = step.and_then(|step| self.step(frames, window, &step));
             let tried = moved.map(|moved| (moved, self.assemble(frames, &mut trial)));
@@ -189,12 +195,13 @@ impl<'a> Solver<'a> {
         search
     }
 
-    /// Moves the window's frames by a step, each no farther than [`FARTHEST`]; returns the largest change that each was to make, or `None`
-    /// if a coordinate isn't finite after it.
+    /// Moves the window's frames by a step, each no farther than [`FARTHEST`]; returns the largest change that each was to
+    /// make, or `None` if a coordinate isn't finite after it.
     fn step(&self, frames: &mut [Vec<f64>], window: Window, step: &[f64]) -> Option<Vec<f64>> {
         let mut moved = Vec::with_capacity(window.count);
         for (f, step) in window.frames().zip(step.chunks_exact(self.n)) {
             let most = step.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            // A long step is shortened frame by frame: its direction counts, and neighbours follow in the next step.
             if most > FARTHEST {
                 let shorter: Vec<f64> = step.iter().map(|x| x * FARTHEST / most).collect();
                 self.problem.model.step(&mut frames[f], &shorter);

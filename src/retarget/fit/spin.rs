@@ -10,16 +10,17 @@ use crate::retarget::model::Model;
 use crate::skeleton::Skeleton;
 use nalgebra::UnitQuaternion;
 
-/// Turn of a flight beyond which it would be another motion; such a flight stays as it is. Radians. Chosen: turned by half a radian,
-/// DeepMimic's backflip is 3.6 cm from its source in the mean instead of 2.4.
+/// Turn of a flight beyond which it would be another motion; such a flight stays as it is. Radians. Chosen: turned by half a
+/// radian, DeepMimic's backflip is 3.6 cm from its source in the mean instead of 2.4.
 const FARTHEST: f64 = 0.5;
-/// By how much such a flight is turned for a body that is to perform it, radians. With half a radian, DeepMimic's backflip comes down
-/// too fast to stand (survival 0.97 and 0.94 with two seeds); with 0.3 three seeds gave 0.97, 0.97 and 0.94, nearer to the source.
+/// By how much such a flight is turned for a body that is to perform it, radians. With half a radian, DeepMimic's backflip
+/// comes down too fast to stand (survival 0.97 and 0.94 with two seeds); with 0.3 three seeds gave 0.97, 0.97 and 0.94,
+/// nearer to the source.
 const PART: f64 = 0.3;
 /// Turn from which on not even that helps, for the source's spin comes from elsewhere. Radians. Chosen.
 const ELSEWHERE: f64 = 1.0;
-/// How many times as far what doesn't stand turns before and after a flight. Chosen: trunk, arms and head have about half of the
-/// body's inertia, and legs that stand don't turn.
+/// How many times as far what doesn't stand turns before and after a flight. Chosen: trunk, arms and head have about half of
+/// the body's inertia, and legs that stand don't turn.
 const LEADS: f64 = 2.0;
 /// Turn from which on a note tells of it, radians. Chosen.
 const NOTED: f64 = 0.1;
@@ -58,6 +59,7 @@ pub(super) fn turns(trajectory: &Trajectory, flights: &[Flight]) -> FlightTurns 
         let Some(turns) = needed(trajectory, flight) else {
             continue;
         };
+        // How far it needs to be turned decides whether it is: wholly, in part or not at all.
         let needs = farthest(&turns);
         let Some(turns) = within_reason(turns, trajectory.to_perform) else {
             continue;
@@ -95,6 +97,7 @@ fn within_reason(turns: Turns, to_perform: bool) -> Option<Turns> {
     if needs <= FARTHEST {
         return Some(turns);
     }
+    // All turns in proportion, so that the largest is `PART`: the spin is then as uneven as before, but less so.
     let turns = turns.iter().map(|turn| turn.powf(PART / needs));
     (to_perform && needs < ELSEWHERE).then(|| turns.collect())
 }
@@ -104,13 +107,14 @@ fn farthest(turns: &[UnitQuaternion<f64>]) -> f64 {
     turns.iter().map(UnitQuaternion::angle).fold(0.0, f64::max)
 }
 
-/// A flight's turns, and those before and after it that lead to and from their speed. These are faster, for legs that stand have no part
-/// in them, but never farther than those of the flight.
+/// A flight's turns, and those before and after it that lead to and from their speed. These are faster, for legs that stand
+/// have no part in them, but never farther than those of the flight.
 fn with_leads(flight: &Flight, turns: &[UnitQuaternion<f64>], fps: f64) -> Vec<(i64, FlightTurn)> {
     let last = turns.len() - 1;
     let most = farthest(turns);
     let turn = |by, flies| FlightTurn { by, flies };
     let leads = flight.leads(fps).into_iter().map(|lead| {
+        // The turn of the frame next to the ground is the speed that the flight begins or ends with.
         let next = [turns[1], turns[last - 1]][lead.end].scaled_axis();
         let by = (next * (LEADS * lead.share)).cap_magnitude(most);
         let by = UnitQuaternion::from_scaled_axis(by);
@@ -136,10 +140,11 @@ impl Spins {
         Some(Spins { from, steps })
     }
 
-    /// By how much the speed at which the body turns jumps in frame `a` and in frame `b` if it keeps its momentum in between, rad/s; for
-    /// small turns.
+    /// By how much the speed at which the body turns jumps in frame `a` and in frame `b` if it keeps its momentum in
+    /// between, rad/s; for small turns.
     pub fn jolts(&self, (a, b): (i64, i64)) -> Option<[f64; 2]> {
         let at = |index: i64| usize::try_from(index - self.from).ok();
+        // Step i leads from frame i to the next, so a flight from a to b has the steps a to b − 1.
         let steps = self.steps.get(at(a)?..at(b)?)?;
         let kept = mean_momentum(steps)?;
         let jolt = |step: &Step| (step.inverse_inertia * (kept - step.momentum)).norm();
@@ -160,13 +165,15 @@ pub(super) fn turn_goals(
         let moved = com + turn.by * (*point - com);
         *point = point.lerp(&moved, share(model, key.slot, anchors, turn.flies));
     }
+    // A share of a rotation is the same axis with a share of the angle.
     for (goal, rotation) in goals.orientations.iter().zip(&mut goals.rotations[f]) {
         let share = share(model, goal.slot, anchors, turn.flies);
         *rotation = turn.by.powf(share) * *rotation;
     }
 }
 
-/// The note `spin-corrected` of flights that were turned far, by up to so many radians; `all` tells whether all of them spin freely now.
+/// The note `spin-corrected` of flights that were turned far, by up to so many radians; `all` tells whether all of them spin
+/// freely now.
 pub(super) fn problem(farthest: f64, all: bool) -> Option<Problem> {
     let rest = if all {
         ""

@@ -8,8 +8,8 @@ use super::window::Window;
 use crate::retarget::qpos::CycleStep;
 use nalgebra::Matrix3;
 
-/// A coupling across the seam of a cycle, between one of the last two frames and one of the first two: a corner of the matrix, far from
-/// its band.
+/// A coupling across the seam of a cycle, between one of the last two frames and one of the first two: a corner of the
+/// matrix, far from its band.
 struct Corner {
     /// Index of the first unknown of the block's rows.
     row: usize,
@@ -22,8 +22,8 @@ struct Corner {
 
 /// Gradient and Gauss–Newton matrix of the cost, by the frames of a window.
 ///
-/// An acceleration couples each frame to the next two, so the matrix is a band of blocks, and where the window is a whole cycle, some
-/// corners.
+/// An acceleration couples each frame to the next two, so the matrix is a band of blocks, and where the window is a whole
+/// cycle, some corners.
 pub(super) struct System {
     /// The frames.
     window: Window,
@@ -60,6 +60,7 @@ impl System {
         self.band.clear();
         self.gradient.fill(0.0);
         self.corners.clear();
+        // What depends on one frame alone goes into its own block …
         let mut pose = problem.model.empty_pose();
         let mut cost = 0.0;
         for (place, f) in self.window.frames().enumerate() {
@@ -69,12 +70,14 @@ impl System {
             };
             cost += problem.frame(f, &frames[f], &mut pose, &mut normal);
         }
+        // … and what couples frames into the blocks beside it as well.
         cost + self.smoothness(problem, groups, cycle, frames)
     }
 
-    /// The step of Levenberg and Marquardt: `damping` times the mean of the diagonal is added to the whole diagonal. `None` where the
-    /// equations aren't positive definite.
+    /// The step of Levenberg and Marquardt: `damping` times the mean of the diagonal is added to the whole diagonal. `None`
+    /// where the equations aren't positive definite.
     pub fn solve(&self, factor: &mut Factor, damping: f64, seam_rounds: usize) -> Option<Vec<f64>> {
+        // Relative to the mean stiffness, so that the damping means the same for every skeleton and weight.
         if !factor.set(&self.band, self.band.mean_times(damping)) {
             return None;
         }
@@ -86,12 +89,14 @@ impl System {
         Some(x)
     }
 
-    /// Brings the corners C into the solution `x` of the band M by rounds of x ← M⁻¹(b − C x). They converge because M − C is positive
-    /// definite as M + C is. Each change of x is −M⁻¹C times the one before it, and begins at the seam's frames alone.
+    /// Brings the corners C into the solution `x` of the band M by rounds of x ← M⁻¹(b − C x). They converge because M − C
+    /// is positive definite as M + C is. Each change of x is −M⁻¹C times the one before it, and begins at the seam's frames
+    /// alone.
     fn close_seam(&self, factor: &Factor, x: &mut [f64], rounds: usize) {
         let mut change = x.to_vec();
         for _ in 0..rounds {
             let mut right = vec![0.0; x.len()];
+            // The matrix is symmetric: each corner stands for itself and its transpose.
             for corner in &self.corners {
                 for i in 0..corner.size {
                     for k in 0..corner.size {
@@ -124,6 +129,7 @@ impl System {
             -1..count + 1
         };
         let step = |place: i64| difference(problem, cycle, frames, &window, place);
+        // Second differences times the squared rate are accelerations, so weights mean the same at every frame rate.
         let rate = problem.fps * problem.fps;
         let mut cost = 0.0;
         let mut into = step(middles.start - 1);
@@ -145,7 +151,8 @@ impl System {
         cost
     }
 
-    /// Adds the cost of hinges that turn faster than they may in the step `out` from frame `f`, which is at `place`, to the next.
+    /// Adds the cost of hinges that turn faster than they may in the step `out` from frame `f`, which is at `place`, to the
+    /// next.
     fn hinge_speeds(&mut self, problem: &LeastSquares, out: &[f64], f: usize, place: i64) -> f64 {
         let at = [place, place + 1].map(|p| self.window.solved(p));
         let square = (weight::HINGE_SPEED * problem.fps).powi(2);
@@ -169,7 +176,8 @@ impl System {
         cost
     }
 
-    /// Adds the cost of a second difference between three frames, as far as they are solved for; `square` is the squared weight.
+    /// Adds the cost of a second difference between three frames, as far as they are solved for; `square` is the squared
+    /// weight.
     fn add(
         &mut self,
         group: &DofGroup,
@@ -178,7 +186,9 @@ impl System {
         bend: &SecondDifference,
     ) -> f64 {
         for i in 0..3 {
+            // Frames beside the window stay, and have no equations.
             let Some(a) = at[i] else { continue };
+            // Jᵀ w² r into the gradient, Jᵀ w² J into the matrix; only from earlier to later frames, for it is symmetric.
             let column = bend.by[i].transpose() * square;
             let gradient = column * bend.r;
             for d in 0..group.size {
@@ -194,8 +204,8 @@ impl System {
         0.5 * square * bend.r.norm_squared()
     }
 
-    /// Adds a block between the `size` degrees of freedom from `dof` on of the frames at places `a` and `b`, which are `ahead` apart in
-    /// time.
+    /// Adds a block between the `size` degrees of freedom from `dof` on of the frames at places `a` and `b`, which are
+    /// `ahead` apart in time.
     fn couple(
         &mut self,
         (dof, size): (usize, usize),
@@ -203,6 +213,7 @@ impl System {
         block: &Matrix3<f64>,
     ) {
         let n = self.n;
+        // Over the seam of a ring the later frame is in an earlier place.
         if ahead > 0 && b != a + ahead {
             self.corners.push(Corner {
                 row: a * n + dof,

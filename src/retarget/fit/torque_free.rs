@@ -1,14 +1,15 @@
 //! Rotation with nothing to push on: the turns by which a body keeps its angular momentum in flight.
 //!
-//! The body is turned as a whole about its centre of mass, by a rotation δ(t) that gives it the same angular momentum L̄ in every step and
-//! is none at both ends of the flight. For small turns I(t) δ̇ = L̄ − L(t), so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L. From there L̄ is found by
-//! shooting: what is left of δ at the end tells how far L̄ is off (Newton's method).
+//! The body is turned as a whole about its centre of mass, by a rotation δ(t) that gives it the same angular momentum L̄ in
+//! every step and is none at both ends of the flight. For small turns I(t) δ̇ = L̄ − L(t), so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L. From
+//! there L̄ is found by shooting: what is left of δ at the end tells how far L̄ is off (Newton's method).
 
 use crate::retarget::qpos::{put_quaternion, quaternion, vector};
 use crate::skeleton::{Skeleton, Twist};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-/// Most corrections of the momentum of a flight. Chosen: Newton's method takes a few, and what takes more has no solution nearby.
+/// Most corrections of the momentum of a flight. Chosen: Newton's method takes a few, and what takes more has no solution
+/// nearby.
 const SHOTS: usize = 12;
 /// Most corrections of the turn of a step; chosen likewise.
 const CORRECTIONS: usize = 16;
@@ -16,8 +17,8 @@ const CORRECTIONS: usize = 16;
 const LEFT_AT_END: f64 = 1e-5;
 /// What may be left of the correction of a step, radians. Chosen a tenth of that.
 const LEFT_OF_STEP: f64 = 1e-6;
-/// A shot that leaves less than this share of the turn shows that the derivative is still good, and it isn't found anew (chord method).
-/// Chosen.
+/// A shot that leaves less than this share of the turn shows that the derivative is still good, and it isn't found anew
+/// (chord method). Chosen.
 const CHORD: f64 = 0.3;
 /// Share of the momentum by which it is varied to find the derivative. Chosen: turns are found to 1e-6.
 const VARIED: f64 = 1e-3;
@@ -58,10 +59,10 @@ impl TorqueFreeFlight<'_> {
                 Some(derivative) => derivative,
                 None => self.derivative(&momentum, &off)?,
             };
+            // Newton's step; where it overshoots, half of it.
             let mut step = derivative * off;
             let mut found = self.shoot(&(momentum - step))?;
             if found.1.norm() > off.norm() {
-                // A whole step may lead too far.
                 step /= 2.0;
                 found = self.shoot(&(momentum - step))?;
             }
@@ -81,17 +82,19 @@ impl TorqueFreeFlight<'_> {
 
     /// The derivative of the momentum by the turn at the end, by forward differences from where that is `off`.
     fn derivative(&self, momentum: &Vector3<f64>, off: &Vector3<f64>) -> Option<Matrix3<f64>> {
+        // At least 1e-3 kg·m²/s, for a body that hardly spins.
         let by = VARIED * momentum.norm().max(1.0);
         let varied = |i| Some((self.shoot(&(momentum + Vector3::ith(i, by)))?.1 - off) / by);
         Matrix3::from_columns(&[varied(0)?, varied(1)?, varied(2)?]).try_inverse()
     }
 
-    /// The turns with which the body has this momentum in every step, starting from none. Each step's is found by iteration, for the
-    /// body's inertia turns with it.
+    /// The turns with which the body has this momentum in every step, starting from none. Each step's is found by iteration,
+    /// for the body's inertia turns with it.
     fn turned(&self, momentum: &Vector3<f64>) -> Option<Turns> {
         let (skeleton, fps) = (self.skeleton, self.fps);
         let mut turns = vec![UnitQuaternion::identity()];
         for pair in self.frames.windows(2) {
+            // The frame before, turned as it was found, and the next one, turned likewise to begin with.
             let mut by = *turns.last()?;
             let mut pair = pair.to_vec();
             turn(skeleton, &mut pair[0], &by);
@@ -100,6 +103,8 @@ impl TorqueFreeFlight<'_> {
             for _ in 0..CORRECTIONS {
                 pair[1].clone_from(&next);
                 turn(skeleton, &mut pair[1], &by);
+                // The momentum that is missing, divided by the inertia, is the missing rate; times the step's duration, the
+                // turn.
                 let more = ease * (momentum - mean_of_step(skeleton, &pair, fps)) / fps;
                 by = UnitQuaternion::from_scaled_axis(more) * by;
                 if more.norm() < LEFT_OF_STEP {
@@ -148,6 +153,7 @@ fn mean_of_step(skeleton: &Skeleton, pair: &[Vec<f64>], fps: f64) -> Vector3<f64
         let poses = skeleton.forward(qpos);
         skeleton.momentum(&poses, &skeleton.twists(qpos, &qvel)).1
     };
+    // One velocity for the whole step, but the body's shape changes in it.
     (momentum(&pair[0]) + momentum(&pair[1])) / 2.0
 }
 
@@ -168,6 +174,7 @@ fn inertia(skeleton: &Skeleton, poses: &[Isometry3<f64>]) -> Matrix3<f64> {
 /// Turns a pose about its centre of mass.
 pub(super) fn turn(skeleton: &Skeleton, qpos: &mut [f64], by: &UnitQuaternion<f64>) {
     let com = skeleton.com(&skeleton.forward(qpos));
+    // The joints stay, so turning the root about the centre of mass turns all of the body.
     let root = com + by * (vector(qpos, 0) - com);
     qpos[..3].copy_from_slice(root.as_slice());
     put_quaternion(qpos, 3, &(by * quaternion(qpos, 3)));

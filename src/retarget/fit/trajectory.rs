@@ -9,10 +9,12 @@ use crate::retarget::model::Model;
 use crate::retarget::qpos::CycleStep;
 use nalgebra::Isometry3;
 
-/// Time before and after a flight in which a foot is about to leave the ground or has just come down, s. Chosen: at 60 Hz three frames.
+/// Time before and after a flight in which a foot is about to leave the ground or has just come down, s. Chosen: at 60 Hz
+/// three frames.
 pub(super) const NEAR: f64 = 0.05;
 
-/// A trajectory of poses and what stands in it. Indices go beyond its frames where it repeats: −1 is the last frame of the cycle before.
+/// A trajectory of poses and what stands in it. Indices go beyond its frames where it repeats: −1 is the last frame of the
+/// cycle before.
 pub(super) struct Trajectory<'a> {
     /// The skeleton.
     pub model: &'a Model<'a>,
@@ -70,10 +72,11 @@ impl Trajectory<'_> {
     }
 }
 
-/// How far the body in `slot` goes along when the whole body is moved, 0 to 1. In flight everything does. On the ground, what stands
-/// stays, and the knee or elbow above it goes half the way.
+/// How far the body in `slot` goes along when the whole body is moved, 0 to 1. In flight everything does. On the ground,
+/// what stands stays, and the knee or elbow above it goes half the way.
 pub(super) fn share(model: &Model, slot: Slot, anchors: &[Anchor], flies: bool) -> f64 {
     let end = end_below(slot).unwrap_or(slot);
+    // A shin belongs to its foot, a forearm to its hand; all other bodies to themselves.
     let stands = !flies && is_anchored(model, end, anchors);
     match (stands, end == slot) {
         (false, _) => 1.0,

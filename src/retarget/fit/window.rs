@@ -1,7 +1,7 @@
 //! Which frames are solved for together.
 
-/// Frames that are solved together: `count` from `start` on, in a trajectory of `total`. In one that repeats, a window may pass over
-/// the end. The frames around the window stay as they are.
+/// Frames that are solved together: `count` from `start` on, in a trajectory of `total`. In one that repeats, a window may
+/// pass over the end. The frames around the window stay as they are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::retarget) struct Window {
     /// The first frame.
@@ -15,8 +15,8 @@ pub(in crate::retarget) struct Window {
 }
 
 impl Window {
-    /// The frame at a place in the window; places before its start and after its end are the frames around it. `None` beyond the ends
-    /// of a trajectory that doesn't repeat.
+    /// The frame at a place in the window; places before its start and after its end are the frames around it. `None` beyond
+    /// the ends of a trajectory that doesn't repeat.
     pub fn frame(&self, place: i64) -> Option<usize> {
         let (at, total) = (self.start as i64 + place, self.total as i64);
         let inside = (0..total).contains(&at) || self.repeats;

@@ -1,4 +1,5 @@
-//! Clips of few frames get more of them: between frames that are far apart a body's velocity is uncertain, most of all in flight.
+//! Clips of few frames get more of them: between frames that are far apart a body's velocity is uncertain, most of all in
+//! flight.
 
 use crate::clip::{Clip, Problem, Severity};
 use std::borrow::Cow;
@@ -24,8 +25,8 @@ pub(super) fn raise(
     if fps >= LOW {
         return (clip, own, None);
     }
-    // A part that isn't cut at frames has a rate a little off that of its whole; taking off a tenth before rounding up gives both
-    // the same multiple.
+    // A part that isn't cut at frames has a rate a little off that of its whole; taking off a tenth before rounding up gives
+    // both the same multiple.
     let times = (ENOUGH / fps - 0.1).ceil().min(MOST_TIMES) as usize;
     let is_short = clip.frames.len().saturating_mul(times) <= MOST_FRAMES;
     match is_short.then(|| clip.resample(fps * times as f64)) {

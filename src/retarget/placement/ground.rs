@@ -1,7 +1,8 @@
 //! How high the ground is.
 //!
-//! The file's z = 0 is believed as long as feet stand near it. A clip in which they don't come down, such as the middle of a cartwheel
-//! or a flight, must not be put on its feet. Only where nothing supports z = 0, the ground is where the body as a whole stands.
+//! The file's z = 0 is believed as long as feet stand near it. A clip in which they don't come down, such as the middle of a
+//! cartwheel or a flight, must not be put on its feet. Only where nothing supports z = 0, the ground is where the body as a
+//! whole stands.
 
 use crate::motion::contact;
 use crate::retarget::setting::Setting;
@@ -26,12 +27,13 @@ const ELSEWHERE: f64 = 0.12;
 const HIGHER: f64 = 0.07;
 /// Height of the lowest point up to which a clip without a stance may be a flight, leg lengths.
 const FLIGHT: f64 = 1.5;
-/// Heights of the ground above the lowest stance that are tried, leg lengths. When the source stands on its toes, the tip of a foot
-/// without toes is below the ball of the foot: a boxer floated by 5 cm.
+/// Heights of the ground above the lowest stance that are tried, leg lengths. When the source stands on its toes, the tip of
+/// a foot without toes is below the ball of the foot: a boxer floated by 5 cm.
 const TIPTOE: [f64; 3] = [0.0, 0.04, 0.08];
 /// How many times as long feet have to stand on a higher level to be believed.
 const MUCH_LONGER: f64 = 1.5;
-/// An unknown lift is rounded to multiples of this, metres, so that the same rig gets the same lift in a longer or shorter clip.
+/// An unknown lift is rounded to multiples of this, metres, so that the same rig gets the same lift in a longer or shorter
+/// clip.
 const STEP: f64 = 0.01;
 /// One in this many frames may be below the lowest point: recordings have outliers.
 const OUTLIERS: usize = 20;
@@ -61,8 +63,8 @@ pub(super) fn find(points: &Points, lift: Option<f64>, setting: &Setting) -> Gro
         let higher = expected + HIGHER * leg;
         standing(&points.soles, higher, setting).map(|(_, level)| level)
     });
-    // Feet near the expected level settle it. Feet far from it, or no stance and a lowest point that no flight explains, say that the
-    // file's z = 0 isn't the ground.
+    // Feet near the expected level settle it. Feet far from it, or no stance and a lowest point that no flight explains, say
+    // that the file's z = 0 isn't the ground.
     let off = match feet {
         Some(level) if (level - expected).abs() <= NOISE * leg => return trusted,
         Some(level) if (level - expected).abs() <= ELSEWHERE * leg => {
@@ -74,8 +76,8 @@ pub(super) fn find(points: &Points, lift: Option<f64>, setting: &Setting) -> Gro
         Some(_) => true,
         None => !(-ELSEWHERE * leg..FLIGHT * leg).contains(&(lowest - expected)),
     };
-    // Then the ground is where the body as a whole stands, or its lowest point. The same counts where all of the body stands far
-    // above z = 0, even if no foot says so.
+    // Then the ground is where the body as a whole stands, or its lowest point. The same counts where all of the body stands
+    // far above z = 0, even if no foot says so.
     let elsewhere = |floor: f64| Ground { floor, lift: 0.0 };
     let low_stance = most_stood_on(&points.all, lowest, setting);
     match low_stance {
@@ -85,7 +87,8 @@ pub(super) fn find(points: &Points, lift: Option<f64>, setting: &Setting) -> Gro
     }
 }
 
-/// The level at or a little above `lowest` on which the points stand, metres: a higher one only if they stand there much longer.
+/// The level at or a little above `lowest` on which the points stand, metres: a higher one only if they stand there much
+/// longer.
 fn most_stood_on(points: &[Vec<Vector3<f64>>], lowest: f64, setting: &Setting) -> Option<f64> {
     let levels = TIPTOE.into_iter().filter_map(|higher| {
         let floor = lowest + higher * setting.leg;

@@ -7,8 +7,8 @@ use crate::retarget::goals::{Goals, LimbShift};
 use crate::retarget::source::Source;
 use nalgebra::Vector3;
 
-/// Time before and after a contact in which a hand goes over to its place on the ground, s. Chosen: about what a hand takes to reach
-/// down.
+/// Time before and after a contact in which a hand goes over to its place on the ground, s. Chosen: about what a hand takes
+/// to reach down.
 const FADE: f64 = 0.25;
 
 /// Moves a hand's targets to the scaled source's wrist while that is on the ground.

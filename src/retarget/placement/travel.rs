@@ -1,7 +1,7 @@
 //! Clips that walk on the spot get their travel back.
 //!
-//! Games move such a clip by themselves; physics can't walk on a treadmill that isn't there. While a foot is down it slides backward
-//! at the speed of the travel that was taken out, so that speed can be read off the feet.
+//! Games move such a clip by themselves; physics can't walk on a treadmill that isn't there. While a foot is down it slides
+//! backward at the speed of the travel that was taken out, so that speed can be read off the feet.
 
 use crate::clip::{LoopMode, Problem, Severity};
 use crate::retarget::end_effector::soles;
@@ -24,8 +24,8 @@ const SLOWEST: f64 = 0.4;
 const AGREES: f64 = 0.5;
 /// … and the share of the frames with a foot down that have to agree.
 const MAJORITY: f64 = 0.6;
-/// Share of the frames in which each foot is the lower one at least, if the clip doesn't repeat: a gait, and not a single slide.
-/// One in this many frames.
+/// Share of the frames in which each foot is the lower one at least, if the clip doesn't repeat: a gait, and not a single
+/// slide. One in this many frames.
 const ALTERNATES: usize = 5;
 
 /// The velocity that a clip on the spot lacks, m/s, if its feet slide steadily while they are down.
@@ -38,11 +38,13 @@ pub(super) fn missing(goals: &Goals, model: &Model, setting: &Setting) -> Option
     } = *setting;
     let last = goals.frames().checked_sub(1)?;
     let away = |f: usize| (goals.root(f) - goals.root(0)).xy().norm();
+    // A clip that goes somewhere has its travel, even if it comes back.
     let strays = (0..=last).any(|f| away(f) > STRAYS * leg);
     if strays || away(last) > ON_THE_SPOT * leg {
         return None;
     }
     let soles = soles(model, goals);
+    // A cycle on the spot is a gait. A clip that ends may be a single slide, so both feet have to take turns.
     if loop_mode == LoopMode::Clamp && !alternate(&soles) {
         return None;
     }
@@ -86,6 +88,7 @@ fn sliding(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64) -> Option<Vector3<f6
         .fold(f64::INFINITY, f64::min);
     let mut velocities: Vec<Vector3<f64>> = Vec::new();
     for pair in soles.windows(2) {
+        // The foot's lowest point is the one on the ground.
         let point = lowest(&pair[0])?;
         if pair[0][point].z < floor + DOWN * leg {
             let v = (pair[1][point] - pair[0][point]) * fps;
@@ -97,6 +100,7 @@ fn sliding(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64) -> Option<Vector3<f6
     if speed < SLOWEST * leg {
         return None;
     }
+    // Frames in which a foot comes down or leaves slide otherwise; most have to agree.
     let agreeing: Vec<Vector3<f64>> = velocities
         .iter()
         .filter(|v| (*v - middle).norm() < AGREES * speed)

@@ -1,8 +1,8 @@
 //! How the source's bones correspond to the skeleton's.
 //!
-//! Rigs put a joint's axes anywhere, and rest with arms out, down or in between. So axes are compared by the figure alone: each slot
-//! gets a frame from the directions of its bones at rest, once in the source and once in the skeleton. The turn between the two is
-//! constant, and carries every orientation of the source's joint over to the body.
+//! Rigs put a joint's axes anywhere, and rest with arms out, down or in between. So axes are compared by the figure alone:
+//! each slot gets a frame from the directions of its bones at rest, once in the source and once in the skeleton. The turn
+//! between the two is constant, and carries every orientation of the source's joint over to the body.
 
 use crate::clip::Clip;
 use crate::humanoid::{HumanoidMap, Slot};
@@ -79,6 +79,8 @@ pub(super) fn align(
         let Some(to) = source.frame(slot) else {
             continue;
         };
+        // The body as it would be in the source's rest pose: turned by what leads from its own slot's frame to the source's.
+        // Seen from the joint at rest, that is the turn that stays.
         let body_at_source_rest = to * from.inverse() * body_rest[body].rotation;
         let joint_from_body = source_rest[joint].rotation.inverse() * body_at_source_rest;
         binds.push(Bind {
@@ -130,6 +132,7 @@ impl Figure {
     fn left(&self) -> Option<Vector3<f64>> {
         let arms = self.across(&ARM_PAIRS);
         let hips = self.across(&LEG_PAIRS).or(arms)?;
+        // Hips and shoulders together, for either may be twisted at rest.
         let across = hips + arms.unwrap_or(hips);
         Vector3::new(across.x, across.y, 0.0).try_normalize(1e-9)
     }
@@ -148,7 +151,8 @@ impl Figure {
             Slot::RightFoot | Slot::RightToes => {
                 return self.foot(Slot::RightLowerLeg, Slot::RightFoot, Slot::RightToes);
             }
-            // Knees turn about the axis to the left, however far a leg is lifted: rigs that rest in mid-stride have one leg bent.
+            // Knees turn about the axis to the left, however far a leg is lifted: rigs that rest in mid-stride have one leg
+            // bent.
             Slot::LeftUpperLeg | Slot::LeftLowerLeg | Slot::RightUpperLeg | Slot::RightLowerLeg => {
                 let along = self.limb_direction(slot)?;
                 return basis(&along, &along.cross(&left));
@@ -187,12 +191,13 @@ impl Figure {
         self.span(from, to).or(upper_arm)?.try_normalize(1e-9)
     }
 
-    /// A foot's orientation. The sole of a foot that stands is level, wherever the rig puts the toes' joint. A foot in the air is
-    /// taken relative to its shin, as if that were upright; taken as level, its toes pointed backward on two rigs that rest in
-    /// mid-stride, and limbs jumped by 32 and 49 cm.
+    /// A foot's orientation. The sole of a foot that stands is level, wherever the rig puts the toes' joint. A foot in the
+    /// air is taken relative to its shin, as if that were upright; taken as level, its toes pointed backward on two rigs
+    /// that rest in mid-stride, and limbs jumped by 32 and 49 cm.
     fn foot(&self, shin: Slot, foot: Slot, toes: Slot) -> Option<UnitQuaternion<f64>> {
         let (up, forward) = (Vector3::z(), self.left()?.cross(&Vector3::z()));
         let lean = self.lean(shin).unwrap_or_else(UnitQuaternion::identity);
+        // The heading of the toes counts and not their height: rigs put that joint anywhere between sole and instep.
         let level = |v: Vector3<f64>| (lean.inverse() * v).xy().push(0.0);
         let toes = self.span(foot, toes).map(level);
         let toward = toes.and_then(|v| v.try_normalize(1e-3));
@@ -202,13 +207,15 @@ impl Figure {
     /// The turn of a shin from upright, if it leans so far that its foot can't be flat on the ground.
     fn lean(&self, shin: Slot) -> Option<UnitQuaternion<f64>> {
         let (down, along, left) = (-Vector3::z(), self.limb_direction(shin)?, self.left()?);
+        // The leg's frames with the shin as it is and upright differ by the lean, about the axis to the left.
         let leans = along.dot(&down) < STANDS;
         let leg = |along: &Vector3<f64>| basis(along, &along.cross(&left));
         leans.then_some(leg(&along)? * leg(&down)?.inverse())
     }
 }
 
-/// The right-handed frame whose first axis is along `along` and whose second is nearest to `second`; `None` if they are parallel.
+/// The right-handed frame whose first axis is along `along` and whose second is nearest to `second`; `None` if they are
+/// parallel.
 fn basis(along: &Vector3<f64>, second: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
     let x = along.try_normalize(1e-9)?;
     let z = x.cross(second).try_normalize(1e-9)?;

@@ -44,10 +44,14 @@ impl<'a> Guesser<'a> {
             let turns = self.local(facing, &world);
             // No history: the same pose gives the same coordinates, wherever the clip begins.
             qpos = self.skeleton.rotations_to_qpos(&root, &turns, None);
+            // Hinges take what they can of the turn, within their limits. Ball joints may go beyond theirs: the fit brings
+            // them back.
             limits::clamp_hinges(self.skeleton, &mut qpos);
             reached = self.skeleton.forward(&qpos);
             for (b, rotation) in world.iter_mut().enumerate().skip(1) {
                 let goal = self.goal(b, rotations);
+                // What can take any orientation keeps its goal; all else is as it was reached, and those below it make up
+                // for it.
                 let free = goal.filter(|_| self.turns_freely(b));
                 *rotation = free.unwrap_or(reached[b].rotation);
             }
@@ -57,6 +61,7 @@ impl<'a> Guesser<'a> {
         qpos[..3].copy_from_slice(shift.as_slice());
         let shift = Translation3::from(shift);
         reached.iter_mut().for_each(|body| *body = shift * *body);
+        // An angle and the same plus a full turn are one pose; the one nearer to the frame before makes no jump.
         if let Some(before) = before {
             limits::unwrap(self.skeleton, before, &mut qpos);
         }
@@ -92,8 +97,8 @@ impl<'a> Guesser<'a> {
         self.skeleton.bodies.iter().enumerate().map(turn).collect()
     }
 
-    /// Keeps the head's target within what the neck can do. Otherwise a head that turns further, as a robot's does, takes chest and
-    /// arms along.
+    /// Keeps the head's target within what the neck can do. Otherwise a head that turns further, as a robot's does, takes
+    /// chest and arms along.
     pub fn limit_head(
         &self,
         qpos: &[f64],
@@ -110,6 +115,7 @@ impl<'a> Guesser<'a> {
         let mut within = qpos.to_vec();
         limits::clamp(self.skeleton, &mut within);
         let within = self.skeleton.forward(&within);
+        // The neck's pose relative to the trunk as limited, on the trunk as guessed.
         let turn = within[neck].rotation.inverse() * within[head].rotation;
         rotations[bind] = bodies[neck].rotation * turn;
     }

@@ -12,11 +12,12 @@ pub(super) fn of(slot: Slot, multiples: &BTreeMap<Slot, f64>) -> (f64, f64) {
 
 /// The weights by default.
 ///
-/// Chosen by trial over the 70 humanoid clips at hand. Ends of limbs count most, feet twice, because a viewer sees these first and
-/// feet have to meet the ground. The position of a joint whose place follows from its neighbours (chest, neck, head, hips of the
-/// legs, toes) has no weight of its own; its orientation has. Knees weigh 0.6: with 0.5, legs of other proportions bend otherwise
-/// than the source's (keypoints 1.94 cm off in the median instead of 1.90), with 1.0 the feet of a walk slide by 8.1 cm/s instead
-/// of 6.4. Elbows weigh 0.7 and shoulders 0.5, so that an arm reaches its hand's target by bending.
+/// Chosen by trial over the 70 humanoid clips at hand. Ends of limbs count most, feet twice, because a viewer sees these
+/// first and feet have to meet the ground. The position of a joint whose place follows from its neighbours (chest, neck,
+/// head, hips of the legs, toes) has no weight of its own; its orientation has. Knees weigh 0.6: with 0.5, legs of other
+/// proportions bend otherwise than the source's (keypoints 1.94 cm off in the median instead of 1.90), with 1.0 the feet of
+/// a walk slide by 8.1 cm/s instead of 6.4. Elbows weigh 0.7 and shoulders 0.5, so that an arm reaches its hand's target by
+/// bending.
 fn default(slot: Slot) -> (f64, f64) {
     match slot {
         Slot::Hips => (1.0, 0.3),

@@ -3,16 +3,16 @@
 use crate::retarget::fade::{ramp, smoothstep};
 use nalgebra::Vector3;
 
-/// Speed at which a frame has 1/e of the say of one at rest in where the point stands, leg lengths per second. Chosen: 7 cm/s for a
-/// leg of 0.9 m, at which a source counts as still.
+/// Speed at which a frame has 1/e of the say of one at rest in where the point stands, leg lengths per second. Chosen: 7
+/// cm/s for a leg of 0.9 m, at which a source counts as still.
 const SLOW: f64 = 0.08;
-/// Distances from its place from which on a point begins to slide with the source, and does so wholly, leg lengths. Chosen: no stance
-/// drags a foot further than that. With twice the width, no clip but one gained, and that little.
+/// Distances from its place from which on a point begins to slide with the source, and does so wholly, leg lengths. Chosen:
+/// no stance drags a foot further than that. With twice the width, no clip but one gained, and that little.
 const SLIDES: [f64; 2] = [0.08, 0.14];
 /// Time at rest from whose mean the place follows, s. Chosen: it is the same in a clip that begins in the midst of the stance.
 const LAST: f64 = 0.5;
-/// Time in which a stance takes hold of a point, and in which it lets go, s. Chosen: a foot that pivots has points that stand one after
-/// the other; held at once, it turned by up to a radian between two frames.
+/// Time in which a stance takes hold of a point, and in which it lets go, s. Chosen: a foot that pivots has points that
+/// stand one after the other; held at once, it turned by up to a radian between two frames.
 const TAKES_HOLD: f64 = 0.08;
 /// Least weight of a frame's speed and of its height in the mean, so that a stance that is never slow or low has a place too.
 const LEAST: [f64; 2] = [1e-9, 1e-3];
@@ -48,6 +48,7 @@ pub(super) fn footholds(track: &Track) -> Vec<(usize, Foothold)> {
     let mut found = Vec::new();
     let mut f = 0;
     while f < path.len() {
+        // A stance goes on to the first frame in which the point doesn't stand.
         let ends = |g: &usize| weights[*g].is_nan();
         let end = (f..path.len()).find(ends).unwrap_or(path.len());
         let stance = Stance {
@@ -61,8 +62,10 @@ pub(super) fn footholds(track: &Track) -> Vec<(usize, Foothold)> {
         let rest = stance.rest();
         for (i, weight) in stance.weights.iter().enumerate() {
             let place = stance.place(i, &rest);
+            // A point that is slow but too high to be held stays in the stance without pulling.
             if *weight > 0.0 {
                 let foothold = Foothold {
+                    // The ball touches the ground when its centre is a radius above it.
                     at: Vector3::new(place.x, place.y, track.radius),
                     weight: *weight,
                     hold: weight * stance.hold(i),
@@ -95,12 +98,13 @@ impl Stance<'_> {
         shift * self.fps / ((b - a).max(1) as f64 * self.leg)
     }
 
-    /// Where the point rests: the mean of its path over the last half second in which it is low and slow. What was before has no say,
-    /// so that a stance is the same in a clip that begins in its midst.
+    /// Where the point rests: the mean of its path over the last half second in which it is low and slow. What was before
+    /// has no say, so that a stance is the same in a clip that begins in its midst.
     fn rest(&self) -> Vector3<f64> {
         let enough = LAST * self.fps;
         let (mut sum, mut total) = (Vector3::zeros(), 0.0);
         for j in (0..self.path.len()).rev() {
+            // A Gaussian of the speed: frames at rest decide, frames that roll or slide hardly count.
             let slow = (-(self.speed(j) / SLOW).powi(2)).exp() + LEAST[0];
             let weight = slow * self.weights[j].max(LEAST[1]);
             sum += self.path[j] * weight;
@@ -114,6 +118,7 @@ impl Stance<'_> {
 
     /// Rises to 1 over the first frames and falls over the last; not where the clip cuts the stance.
     fn hold(&self, i: usize) -> f64 {
+        // One frame more than the time, so that even the first and last frame are held a little.
         let frames = TAKES_HOLD * self.fps + 1.0;
         let after = if self.begins { (i + 1) as f64 } else { frames };
         let before = if self.ends {

@@ -10,8 +10,8 @@ use crate::retarget::model::Model;
 use crate::retarget::setting::Setting;
 use nalgebra::Vector3;
 
-/// Heights of a point of a foot's sole up to which it is held fully, and from which on not at all, leg lengths. Chosen: 1.4 and 4.5 cm
-/// for a leg of 0.9 m, within the heights at which [`contact`] takes a foot to stand.
+/// Heights of a point of a foot's sole up to which it is held fully, and from which on not at all, leg lengths. Chosen: 1.4
+/// and 4.5 cm for a leg of 0.9 m, within the heights at which [`contact`] takes a foot to stand.
 const SOLE: [f64; 2] = [0.015, 0.05];
 /// The same for hands. Chosen higher, for the source's wrists stay above the ground.
 const HAND: [f64; 2] = [0.12, 0.2];
@@ -64,6 +64,7 @@ pub(super) fn held(model: &Model, limb: &Limb, setting: &Setting) -> Vec<Vec<Hel
             true => limb.sole_weights(model, k, setting),
             false => limb.hand_weights(model, k, setting),
         };
+        // Each run of frames in which the point stands has one place on the ground.
         let track = Track {
             path,
             weights: &weights,
@@ -99,7 +100,8 @@ impl Limb<'_> {
         self.touches.as_ref().is_some_and(|touches| touches[f])
     }
 
-    /// How near the ground a point of a foot stands, by frame: it rests low, or the source says so. No number where it doesn't stand.
+    /// How near the ground a point of a foot stands, by frame: it rests low, or the source says so. No number where it
+    /// doesn't stand.
     fn sole_weights(&self, model: &Model, k: usize, setting: &Setting) -> Vec<f64> {
         let radius = model.contact_points[self.effector.points[k]].radius;
         let path = &self.paths[k];
@@ -120,6 +122,7 @@ impl Limb<'_> {
         let height = |k: usize, f: usize| self.bottom(model, k, f);
         let is_lowest = |f: usize| {
             let mut points = 0..self.paths.len();
+            // A palm lies on several points; the back of the hand is no support.
             points.all(|other| height(k, f) < height(other, f) + PALM)
         };
         let weight = |f: usize| match self.touches(f) && is_lowest(f) {

@@ -1,7 +1,7 @@
 //! How the targets of a foot or hand move so that its standing points are where they stand.
 //!
-//! In a stance the move is fitted to the points; before and after it fades out over time, so that nothing jumps when a stance begins
-//! or ends.
+//! In a stance the move is fitted to the points; before and after it fades out over time, so that nothing jumps when a
+//! stance begins or ends.
 
 use super::held::Held;
 use crate::retarget::fade::smoothstep;
@@ -37,8 +37,8 @@ pub(super) fn shifts(held: &[Vec<Held>], keypoints: &[Vector3<f64>], fps: f64) -
 
 /// The turn about Z and the shift that bring the standing points nearest to their footholds; `None` if hardly any stands.
 ///
-/// Weighted least squares in the plane: the means coincide, and the turn is atan2(Σ w a × b, Σ w a · b) with a and b seen from the
-/// means, the planar case of Kabsch's solution (Acta Crystallographica A 32, 1976).
+/// Weighted least squares in the plane: the means coincide, and the turn is atan2(Σ w a × b, Σ w a · b) with a and b seen
+/// from the means, the planar case of Kabsch's solution (Acta Crystallographica A 32, 1976).
 fn fit(held: &[Held], key: &Vector3<f64>) -> Option<LimbShift> {
     let total: f64 = held.iter().map(|h| h.weight).sum();
     if total < STANDS {
@@ -95,6 +95,7 @@ fn bridge(fitted: &[Option<LimbShift>], fade: f64) -> Vec<LimbShift> {
 fn nearest<'a>(
     fitted: impl Iterator<Item = &'a Option<LimbShift>>,
 ) -> Vec<Option<(usize, LimbShift)>> {
+    // Going through the frames in order, a move that was found is 0 frames old, and one frame older in each frame after it.
     let mut last = None;
     let mut step = |found: &Option<LimbShift>| {
         last = found
@@ -116,6 +117,7 @@ fn smooth(shifts: &[LimbShift], half: usize) -> Vec<LimbShift> {
             .skip(from)
             .take(f + half + 1 - from)
         {
+            // At the ends of the clip the window is cut, and the mean divides by what is left.
             let weight = (half + 1 - f.abs_diff(g)) as f64;
             sum.shift += by.shift * weight;
             sum.turn += by.turn * weight;

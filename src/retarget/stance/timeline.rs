@@ -1,5 +1,5 @@
-//! The frames of the goals, and of a motion that repeats a cycle before and after them as well, so that a stance may pass over the
-//! seam.
+//! The frames of the goals, and of a motion that repeats a cycle before and after them as well, so that a stance may pass
+//! over the seam.
 
 use crate::motion::Cycle;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -15,6 +15,7 @@ pub(super) struct Timeline {
 impl Timeline {
     /// The timeline of this many frames; the last frame of a cycle is the first of the next.
     pub fn new(frames: usize, cycle: Option<&Cycle>) -> Timeline {
+        // A whole cycle on either side is longer than any stance that passes over the seam.
         let margin = frames.saturating_sub(1);
         let step = cycle.map(|c| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), c.heading);
@@ -32,6 +33,7 @@ impl Timeline {
         let Some(step) = self.cycle else {
             return path.to_vec();
         };
+        // The last frame is the next cycle's first, so a cycle has one frame less.
         let cycle = self.frames - 1;
         let moved = |by: &Isometry3<f64>, p: &Vector3<f64>| (by * Point3::from(*p)).coords;
         let back = step.inverse();

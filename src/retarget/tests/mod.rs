@@ -5,6 +5,7 @@ mod trimmed;
 use super::qpos::put_quaternion;
 use super::*;
 use crate::clip::{Joint, LoopMode, Margin, Source};
+use crate::explain::{Explain, Fault, Parameter};
 use crate::humanoid::Slot;
 use crate::import;
 use mimic_test_support::foreign;
@@ -318,25 +319,52 @@ fn what_is_no_motion_of_a_humanoid_is_refused() {
     let skeleton = humanoid();
     let rest = skeleton.rest_qpos();
     let good = rig(&skeleton, &rest, &[rest.clone(), rest.clone()], 1.0, 0.0);
+    assert!(retarget(&good, &skeleton, &Options::default()).is_ok());
     let error = |change: &dyn Fn(&mut Clip)| {
         let mut clip = good.clone();
         change(&mut clip);
-        retarget(&clip, &skeleton, &Options::default())
-            .unwrap_err()
-            .to_string()
+        let error = retarget(&clip, &skeleton, &Options::default()).unwrap_err();
+        let told = error.explain();
+        assert_eq!(told.fault, Fault::Input, "{error}");
+        assert!(told.remedy.is_some(), "{error}");
+        (error, told.place.unwrap_or_default())
     };
-    assert!(error(&|clip| clip.frames.clear()).contains("no frames"));
-    assert!(error(&|clip| clip.fps = 0.0).contains("0 Hz"));
-    assert!(error(&|clip| clip.frames[1].truncate(3)).contains("frame 1"));
-    assert!(error(&|clip| clip.frames[1][2].translation.x = f64::NAN).contains("frame 1"));
+    let (empty, _) = error(&|clip| clip.frames.clear());
+    assert!(matches!(empty, RetargetError::Empty { .. }), "{empty}");
+    let (rate, _) = error(&|clip| clip.fps = 0.0);
     assert!(
-        error(&|clip| clip
-            .joints
-            .iter_mut()
-            .for_each(|j| j.rest.translation.vector *= 0.0))
-        .contains("no")
+        matches!(rate, RetargetError::FrameRate { fps: 0.0, .. }),
+        "{rate}"
     );
-    assert!(retarget(&good, &skeleton, &Options::default()).is_ok());
+    let (ragged, place) = error(&|clip| clip.frames[1].truncate(3));
+    assert!(
+        matches!(ragged, RetargetError::Ragged { found: 3, .. }),
+        "{ragged}"
+    );
+    assert_eq!(place, "frame 1");
+    let (_, place) = error(&|clip| clip.frames[1][2].translation.x = f64::NAN);
+    assert_eq!(place, format!("frame 1, joint `{}`", good.joints[2].name));
+    let (_, place) = error(&|clip| clip.joints[2].rest.translation.x = f64::INFINITY);
+    assert_eq!(place, format!("rest pose, joint `{}`", good.joints[2].name));
+    let shrink = |joint: &mut Joint| joint.rest.translation.vector *= 0.0;
+    let (small, _) = error(&|clip| clip.joints.iter_mut().for_each(shrink));
+    assert!(matches!(small, RetargetError::NoSourceLegs), "{small}");
+}
+
+#[test]
+fn a_joint_map_for_another_clip_is_refused() {
+    let skeleton = humanoid();
+    let rest = skeleton.rest_qpos();
+    let clip = rig(&skeleton, &rest, &[rest.clone(), rest.clone()], 1.0, 0.0);
+    let mut map = crate::humanoid::map(&clip.joints).unwrap();
+    map.matches.get_mut(&Slot::Head).unwrap().joint = clip.joints.len();
+    let options = Options {
+        map: Some(map),
+        ..Options::default()
+    };
+    let error = retarget(&clip, &skeleton, &options).unwrap_err();
+    let remedy = error.explain().remedy.expect("a remedy");
+    assert_eq!(remedy.parameter, Some(Parameter::JointMap));
 }
 
 #[test]

@@ -108,8 +108,8 @@ fn as_it_is_and_to_perform(clip: &Clip) -> [Retargeted; 2] {
     })
 }
 
-/// To spin freely this flight would have to be turned by 51 degrees: it stays as it is, or is turned by 17 for a body that is to
-/// perform it. The mean of its momentum's distance from its own mean tells how freely it spins.
+/// To spin freely this flight would have to be turned by 51 degrees: it stays as it is, or is turned by 17 for a body that
+/// is to perform it. The mean of its momentum's distance from its own mean tells how freely it spins.
 #[test]
 fn a_backflip_is_turned_for_a_body_that_performs_it() {
     let Some(clip) = clip("deepmimic/humanoid3d_backflip.txt", None) else {
