@@ -346,9 +346,23 @@ fn what_is_no_motion_of_a_humanoid_is_refused() {
     assert_eq!(place, format!("frame 1, joint `{}`", good.joints[2].name));
     let (_, place) = error(&|clip| clip.joints[2].rest.translation.x = f64::INFINITY);
     assert_eq!(place, format!("rest pose, joint `{}`", good.joints[2].name));
-    let shrink = |joint: &mut Joint| joint.rest.translation.vector *= 0.0;
-    let (small, _) = error(&|clip| clip.joints.iter_mut().for_each(shrink));
-    assert!(matches!(small, RetargetError::NoSourceLegs), "{small}");
+}
+
+/// A figure whose joints are all in one place has no size; only a joint map gets it so far.
+#[test]
+fn a_source_without_size_is_refused() {
+    let skeleton = humanoid();
+    let rest = skeleton.rest_qpos();
+    let mut clip = rig(&skeleton, &rest, &[rest.clone(), rest.clone()], 1.0, 0.0);
+    let options = Options {
+        map: Some(crate::humanoid::map(&clip.joints).unwrap()),
+        ..Options::default()
+    };
+    for joint in &mut clip.joints {
+        joint.rest.translation.vector *= 0.0;
+    }
+    let error = retarget(&clip, &skeleton, &options).unwrap_err();
+    assert!(matches!(error, RetargetError::NoSourceLegs), "{error}");
 }
 
 #[test]
