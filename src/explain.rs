@@ -63,6 +63,8 @@ pub enum Parameter {
     LoopMode,
     /// Which joint is which slot of the humanoid.
     JointMap,
+    /// How much a slot of the humanoid counts in retargeting.
+    SlotWeight,
     /// The physics skeleton.
     Skeleton,
     /// How fast a clip is played.

@@ -20,6 +20,7 @@ fn flag(parameter: Parameter) -> Option<&'static str> {
         Parameter::UpAxis => "--up",
         Parameter::LoopMode => "--loop",
         Parameter::JointMap => "--map",
+        Parameter::SlotWeight => "--weight",
         Parameter::Skeleton => "--skeleton",
         Parameter::Speed => "--speed",
         Parameter::Output => "--out",
@@ -66,18 +67,6 @@ impl Failure {
         let mut parts = error.explain();
         parts.file.get_or_insert_with(|| file.to_owned());
         Self::new(parts)
-    }
-
-    /// The same for an error that does not tell its parts yet: its whole message is the cause, but for the name of its file.
-    pub fn library(file: &Path, error: impl Display) -> Self {
-        let text = error.to_string();
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let names = [file.to_string_lossy(), name];
-        let mut starts = names.iter().flat_map(|n| [format!("`{n}`"), n.to_string()]);
-        let cause = starts
-            .find_map(|start| text.strip_prefix(&start))
-            .unwrap_or(&text);
-        Self::input(file, cause.trim_start_matches(':').trim_start())
     }
 
     /// A file that may be there, but cannot be read.

@@ -79,7 +79,7 @@ impl Preparation {
             to_perform: self.to_perform,
         };
         let done = retarget::retarget(&clip, &skeleton, &options)
-            .map_err(|e| Failure::library(&self.file, e))?;
+            .map_err(|e| Failure::in_file(&self.file, e))?;
         let new = |problem: &&Problem| !clip.problems.contains(problem);
         let found: Vec<_> = done.report.problems.iter().filter(new).cloned().collect();
         printer.problems(&found);

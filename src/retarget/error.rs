@@ -95,7 +95,7 @@ impl Explain for RetargetError {
             ),
             Self::Weight { slot, weight } => {
                 Explanation::input(format!("slot `{slot}` has the weight {weight}"))
-                    .remedy(format!("give it a weight from 0 to {MOST_WEIGHT}"))
+                    .remedy_by(Parameter::SlotWeight, format!("give it a weight from 0 to {MOST_WEIGHT}"))
             }
             Self::Empty { clip } => Explanation::input(format!("clip `{clip}` has no frames"))
                 .remedy_by(Parameter::Take, "choose a take that has frames"),
