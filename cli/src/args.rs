@@ -18,7 +18,7 @@ pub struct Talk {
     /// Print only results and errors
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print more, even when the output is piped
+    /// Print notes on what is being done, even when piped
     #[arg(long, short, global = true)]
     pub verbose: bool,
 }
@@ -36,8 +36,14 @@ pub struct ImportArgs {
     /// Part of the take to keep, in seconds from its start, e.g. 0.5..2, 1.. or ..2
     #[arg(long, value_name = "A..B", value_parser = span)]
     trim: Option<(f64, f64)>,
-    /// Whether the motion repeats
-    #[arg(long = "loop", value_enum, value_name = "MODE", default_value_t)]
+    /// Whether the motion repeats: `auto` (decide by the motion), `wrap` (it does) or `clamp` (it plays once)
+    #[arg(
+        long = "loop",
+        value_enum,
+        value_name = "MODE",
+        default_value_t,
+        hide_possible_values = true
+    )]
     loops: Loop,
     /// Up axis of the data, if the file states a wrong one: x, y, z, -x, -y or -z
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
@@ -96,7 +102,7 @@ impl ImportArgs {
 #[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Retarget options")]
 pub struct RetargetArgs {
-    /// Physics character: `humanoid`, `marathon` or an MJCF file [default: humanoid, or that of the preset]
+    /// Physics character: `humanoid`, `marathon`, `robot` or an MJCF file [default: humanoid; in `train` that of the preset]
     #[arg(long, value_name = "NAME|FILE")]
     pub skeleton: Option<String>,
     /// Joint map, as written by `mimic info --write-map` [default: found by joint names and rest pose]

@@ -10,18 +10,18 @@ use std::process::ExitCode;
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic info kick.fbx               show its takes, its joints and the joint map
-  mimic retarget kick.fbx           retarget the clip to a physics character
-  mimic train kick.fbx              train a policy that performs it (writes the run runs/kick)
-  mimic replay kick --rerun         watch the trained agent and its reference
-  mimic eval kick                   measure how well the agent performs
-  mimic plot kick                   draw how it learned
+  mimic info kick.fbx              show its takes, its joints and the joint map
+  mimic retarget kick.fbx          retarget the clip to a physics character
+  mimic train kick.fbx             train a policy that performs it (runs/kick)
+  mimic replay kick --rerun        watch the trained agent and its reference
+  mimic eval kick                  measure how well the agent performs
+  mimic plot kick                  draw how it learned
 
-Every command accepts the file of an earlier stage and does the missing steps itself: `mimic train kick.fbx`
-imports and retargets first. An input is a path, or a name in the library folder or in runs/. Without an
-input, commands use the newest file or run.
+Every command accepts the file of an earlier stage and does the missing steps itself: \
+`mimic train kick.fbx` imports and retargets first. An input is a path, or a name in the library \
+folder or in runs/. Without an input, commands use the newest file or run.
 
-Results go to standard output, messages to standard error. Exit codes: 0 success, 1 the work failed,
+Results go to standard output, messages to standard error. Exit codes: 0 success, 1 the work failed, \
 2 wrong usage or input.";
 
 /// Turn animation clips into physics characters that perform them

@@ -181,7 +181,8 @@ fn remedy(parts: &Explanation) -> Option<String> {
     })
 }
 
-/// Names and paths come from files: whatever they hold, a message stays on one line and harmless to a terminal.
+/// A path may hold line breaks and control characters, and clap breaks lines. A message stays on one line, and harmless to
+/// a terminal.
 fn one_line(text: &str) -> String {
     let words: Vec<_> = text.split_whitespace().collect();
     let line = words.join(" ");
@@ -197,7 +198,7 @@ mod tests {
         let failure = Failure::input(Path::new("a/kick.fbx"), "truncated\n  at byte 3\x1b[2J");
         assert_eq!(
             failure.message().as_deref(),
-            Some("`a/kick.fbx`: truncated at byte 3[2J")
+            Some("`a/kick.fbx`: truncated at byte 3 [2J")
         );
     }
 

@@ -14,16 +14,17 @@ use mimic::import;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
-Edits are applied in the order of the list above, whatever their order on the command line: each clip is
-trimmed and mirrored, then the clips are joined, and the other edits apply to the whole.
+Edits are applied in the order of the list above, whatever their order on the command line: each \
+clip is trimmed and mirrored, then the clips are joined, and the other edits apply to the whole.
 
 Examples:
-  mimic edit kick.clip --mirror                     kick with the other leg (writes kick-edited.clip)
-  mimic edit take.fbx --loop --in-place             cut the best cycle of a long take, on the spot
+  mimic edit kick.clip --mirror              swap sides (writes kick-edited.clip)
+  mimic edit take.fbx --loop --in-place      cut the best cycle, on the spot
   mimic edit take.clip --trim 2..9 --loop --shortest 2
   mimic edit walk.clip kick.clip --blend 0.4 --out combo.clip
   mimic edit run.clip --speed 1.2 --fps 60
-  mimic edit jump.clip --warp 0:0,0.5:0.8,1:1       delay what happens at 0.5 s to 0.8 s";
+  mimic edit jump.clip --warp 0:0,0.5:0.8,1:1
+                                             delay what happens at 0.5 s to 0.8 s";
 
 /// Default length of a blend, seconds. Chosen.
 const BLEND: f64 = 0.2;

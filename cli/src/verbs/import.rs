@@ -13,11 +13,11 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic import kick.fbx                             write kick.clip
-  mimic import pack.glb --take run --out run.clip   import one take of many
-  mimic import pack.glb --take all --out clips/     write a clip for each take
-  mimic import walk.fbx --trim 0.5..1.6 --loop wrap
-  mimic import mixamo/*.fbx --out clips/            import many files into a folder";
+  mimic import kick.fbx                      write kick.clip
+  mimic import pack.glb --take run           import one take: pack-run.clip
+  mimic import pack.glb --take all -o clips/ write a clip for each take
+  mimic import mixamo/*.fbx --out clips/     import many files into a folder
+  mimic import walk.fbx --trim 0.5..1.6 --loop wrap";
 
 /// Read animation files and write them as clips
 #[derive(clap::Args)]
@@ -187,7 +187,13 @@ fn finish(reports: &[ClipReport], failed: Vec<Failed>, printer: &Printer) -> Out
     let cause = format!("{} of {all} clips could not be imported", failed.len());
     match failed.iter().map(|(_, failure)| failure.code()).min() {
         None => printer.result(&report, text),
-        Some(1) => printer.partial_result(report, text, Failure::work(cause)),
-        Some(_) => printer.partial_result(report, text, Failure::user(cause)),
+        Some(code) => {
+            let failure = match code {
+                1 => Failure::work(cause),
+                _ => Failure::user(cause),
+            };
+            let remedy = "follow the advice for each of them";
+            printer.partial_result(report, text, failure.with_remedy(remedy))
+        }
     }
 }

@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic info kick.fbx                          show takes, joints and the joint map
-  mimic info kick.fbx --write-map kick.json    write the joint map to edit it, then use it with `--map`
-  mimic info kick.clip --json                  print JSON for scripts";
+  mimic info kick.fbx                        show takes, joints and joint map
+  mimic info kick.fbx --write-map kick.json  write the joint map, to edit it
+  mimic info kick.clip --json                print JSON for scripts";
 
 /// Show what is in an animation file: takes, joints, units, joint map and problems
 #[derive(clap::Args)]
@@ -24,7 +24,7 @@ Examples:
 pub struct Args {
     /// FBX, glTF, BVH, ASF/AMC or DeepMimic file, or a clip
     file: PathBuf,
-    /// Write the joint map to FILE, to be edited and passed to `mimic retarget --map`
+    /// Write the joint map to FILE, to edit it and pass it to `mimic retarget --map`
     #[arg(long, value_name = "FILE")]
     write_map: Option<PathBuf>,
 }

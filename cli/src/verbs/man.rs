@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic man | man -l -                              read the manual
-  mimic man --out ~/.local/share/man/man1           write a page for mimic and one per command";
+  mimic man | man -l -                       read the manual
+  mimic man --out ~/.local/share/man/man1    write one page per command";
 
 /// Print the manual page, or write one page per command
 #[derive(clap::Args)]

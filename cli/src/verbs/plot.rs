@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic plot                                     draw the newest run, e.g. as kick.svg
-  mimic plot kick kick-seed7 --out seeds.svg     draw two runs in the same panels
-  mimic plot kick --smooth 1                     draw every iteration, without smoothing
-  mimic plot kick --json > curves.json           write the numbers as well
+  mimic plot                                 draw the newest run, e.g. kick.svg
+  mimic plot kick kick-seed7 -o seeds.svg    draw two runs in the same panels
+  mimic plot kick --smooth 1                 draw every iteration, unsmoothed
+  mimic plot kick --json > curves.json       write the numbers as well
 
-Thin lines show single iterations, thick lines their moving average. Dots show the evaluation at the end.";
+Thin lines show single iterations, thick lines their moving average. Dots show the evaluation at \
+the end.";
 
 /// By default a curve is averaged over the run's length divided by this. Chosen: noise fades, and rises stay visible.
 const SMOOTH_POINTS: usize = 50;
@@ -56,7 +57,7 @@ pub struct Args {
     /// Run folders, or their names in runs/ [default: the newest run]
     #[arg(value_name = "RUN")]
     runs: Vec<PathBuf>,
-    /// Iterations to average each point over; 1 draws them as they are [default: a fiftieth of the run]
+    /// Iterations to average each point over; 1 for none [default: a fiftieth of the run]
     #[arg(long, value_name = "N", value_parser = crate::args::at_least_one)]
     smooth: Option<usize>,
     /// SVG file to write, or a folder [default: RUN.svg, or curves.svg for several runs]

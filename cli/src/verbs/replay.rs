@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic replay --rerun                      open the newest run in the viewer
-  mimic replay kick --rerun --beside        show agent and reference side by side
-  mimic replay kick --rerun --phase 0.44    start at a phase from which `mimic eval` reports a fall
-  mimic replay walk --rerun --perturb       shove the agent, and change its weight and friction
-  mimic replay walk.fbx --save walk.rrd     record the reference of a clip; `rerun walk.rrd` opens it
+  mimic replay --rerun                       open the newest run in the viewer
+  mimic replay kick --rerun --beside         show agent and reference side by side
+  mimic replay kick --rerun --phase 0.44     start where `mimic eval` reports a fall
+  mimic replay walk --rerun --perturb        disturb the agent by shoves
+  mimic replay walk.fbx --save walk.rrd      record a clip; `rerun walk.rrd` opens it
+  mimic replay kick --connect 127.0.0.1:9876
   mimic replay walk-and-run --rerun --sequence walk,run,walk
-                                            go from one motion of a run to the next
-  mimic replay kick --connect 127.0.0.1:9876";
+                                             go from one motion to the next";
 
 /// Longest replay, seconds: every frame is held in memory.
 const MOST_SECONDS: f64 = 3600.0;

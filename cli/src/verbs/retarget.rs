@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic retarget kick.clip                          write kick.motion
-  mimic retarget kick.fbx --out motions/            import first, and write into a folder
-  mimic retarget kick.fbx --map kick.json           use an edited map of `mimic info --write-map`
-  mimic retarget kick.fbx --skeleton robot.xml      use your own MJCF character";
+  mimic retarget kick.clip                      write kick.motion
+  mimic retarget kick.fbx --out motions/        import first; write into a folder
+  mimic retarget kick.fbx --map kick.json       use an edited joint map
+  mimic retarget kick.fbx --skeleton robot.xml  use your own MJCF character";
 
 /// Retarget a clip to a physics character and compute its tracks
 #[derive(clap::Args)]
@@ -27,8 +27,8 @@ pub struct Args {
     /// Motion to write, or a folder [default: NAME.motion in this folder]
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Bring flights closer to what a body can do, as `mimic train` does: they last as long as the contacts allow, and their
-    /// spin is corrected in part where a full correction would change too much
+    /// Favour flights that a body can perform over closeness to the clip, as `mimic train` does: longer flights, and a partial
+    /// correction of spin where a full one would change too much
     #[arg(long)]
     to_perform: bool,
     #[command(flatten)]

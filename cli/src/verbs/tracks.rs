@@ -17,9 +17,9 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic tracks kick.motion                      print a summary
-  mimic tracks kick.fbx --plot kick.svg         import, retarget, and draw the tracks
-  mimic tracks kick.motion --csv kick.csv       write every frame, for other tools";
+  mimic tracks kick.motion                   print a summary
+  mimic tracks kick.fbx --plot kick.svg      import, retarget, and draw the tracks
+  mimic tracks kick.motion --csv kick.csv    write every frame, for other tools";
 
 /// Show the tracks of a motion: phase, centre of mass, momenta, contacts and feasibility
 #[derive(clap::Args)]
