@@ -58,7 +58,7 @@ impl Problem {
             "first-frame-left-out" | "cycle-gap" => Parameter::Trim,
             "unit-guessed" | "invalid-unit" => Parameter::Unit,
             "up-axis-corrected" => Parameter::UpAxis,
-            "unknown-loop-word" => Parameter::LoopMode,
+            "unknown-loop-word" | "loop-gap" => Parameter::LoopMode,
             "map-uncertain" | "not-humanoid" => Parameter::JointMap,
             _ => return None,
         })

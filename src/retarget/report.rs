@@ -1,22 +1,24 @@
-//! How good a retargeted motion is, from the motion and its source alone: the solver's goals and anchors have no say.
+//! How good a retargeted motion is: measured on the motion and its source alone, without the solver's goals and anchors.
 
-use super::reference::Reference;
+use super::proportions::Proportions;
 use super::source::Source;
-use crate::clip::{Clip, Problem, Severity};
+use crate::clip::{Clip, Problem};
 use crate::humanoid::HumanoidMap;
 use crate::motion::{MappedJoint, Motion, RetargetReport, Spread, skate::sole_speed};
 use crate::skeleton::{Skeleton, limits};
 use nalgebra::Isometry3;
 
-/// A foot or hand with what hangs on it, whether the source's touches the ground, and whether it stands still there,
-/// by frame.
+/// A foot or hand.
 pub(super) struct Contact {
+    /// Its body and the bodies that hang on it.
     pub bodies: Vec<usize>,
+    /// Whether the source's touches the ground, by frame.
     pub touches: Vec<bool>,
+    /// Whether it also stands still there, by frame.
     pub stands: Vec<bool>,
 }
 
-/// Measures a motion against its source, which stands where the motion does.
+/// Measures a motion against its source, which is in the motion's frame: same ground, same place over it.
 pub(super) fn report(
     skeleton: &Skeleton,
     source: &Source,
@@ -44,35 +46,33 @@ pub(super) fn report(
     }
 }
 
-/// Confidence below which a joint's place in the map should be looked at.
+/// Confidence below which a joint of the map should be checked. Chosen between that of joints found by the shape of the
+/// rest pose (0.5) and of those found by their names (0.8 and more).
 const UNCERTAIN: f64 = 0.6;
 
+/// The warning `map-uncertain` of joints that may be the wrong ones.
 fn uncertain(map: &[MappedJoint]) -> Option<Problem> {
     let doubtful: Vec<String> = map
         .iter()
         .filter(|joint| joint.confidence < UNCERTAIN)
         .map(|joint| format!("`{}` as {}", joint.joint, joint.slot))
         .collect();
-    (!doubtful.is_empty()).then(|| Problem {
-        id: "map-uncertain".to_owned(),
-        severity: Severity::Warning,
-        message: format!(
-            "names don't say which joints some of these are: {}. Check them, and give a map file where one is wrong",
-            doubtful.join(", ")
-        ),
-    })
+    let message = format!(
+        "these joints of the map are uncertain: {}; check them, and correct the joint map where one is wrong",
+        doubtful.join(", ")
+    );
+    (!doubtful.is_empty()).then(|| Problem::warning("map-uncertain", message))
 }
 
+/// The warning `no-stance` of a clip in which nothing stands.
 fn no_stance(contacts: &[Contact]) -> Option<Problem> {
     let stands = contacts.iter().any(|c| c.stands.contains(&true));
-    (!stands).then(|| Problem {
-        id: "no-stance".to_owned(),
-        severity: Severity::Warning,
-        message: "no foot or hand stands on the ground in any frame, so skating and floating say nothing; is the ground of the clip at z = 0?"
-            .to_owned(),
-    })
+    let message = "no foot or hand stands still on the ground in any frame, so skating and floating could not be \
+                   measured; check that the clip's ground is at z = 0";
+    (!stands).then(|| Problem::warning("no-stance", message))
 }
 
+/// The joint map by names.
 pub(super) fn mapped(clip: &Clip, map: &HumanoidMap) -> Vec<MappedJoint> {
     let named = map.matches.iter().filter_map(|(slot, found)| {
         Some(MappedJoint {
@@ -85,10 +85,11 @@ pub(super) fn mapped(clip: &Clip, map: &HumanoidMap) -> Vec<MappedJoint> {
     named.collect()
 }
 
+/// Distance of hips, shoulders, elbows, wrists, knees and ankles from the source's, over all frames, metres.
 fn keypoint_error(skeleton: &Skeleton, source: &Source, bodies: &[Vec<Isometry3<f64>>]) -> Spread {
-    let reference = Reference::new(source, skeleton);
+    let proportions = Proportions::new(source, skeleton);
     Spread::of(bodies.iter().enumerate().flat_map(|(f, bodies)| {
-        let places = reference.places(source, f).into_iter();
+        let places = proportions.places(source, f).into_iter();
         places.filter_map(|(slot, place)| {
             let body = skeleton.slots.get(&slot)?;
             Some((bodies[*body].translation.vector - place).norm())
@@ -96,6 +97,7 @@ fn keypoint_error(skeleton: &Skeleton, source: &Source, bodies: &[Vec<Isometry3<
     }))
 }
 
+/// Depth of the lowest point below the ground, over all frames, metres.
 fn penetration(skeleton: &Skeleton, bodies: &[Vec<Isometry3<f64>>]) -> Spread {
     Spread::of(
         bodies
@@ -104,12 +106,13 @@ fn penetration(skeleton: &Skeleton, bodies: &[Vec<Isometry3<f64>>]) -> Spread {
     )
 }
 
-/// Frames in which a contact stands.
+/// Frames in which the source's foot or hand stands still.
 fn standing(contact: &Contact) -> impl Iterator<Item = usize> + '_ {
     let flags = contact.stands.iter().enumerate();
     flags.filter(|(_, stands)| **stands).map(|(f, _)| f)
 }
 
+/// Mean height above the ground of what the source has standing there, metres.
 fn float(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
     let height = |f: usize, bodies: &[usize]| skeleton.lowest_point_of(&motion.bodies[f], bodies);
     let heights = contacts
@@ -118,6 +121,7 @@ fn float(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
     Spread::of(heights).mean
 }
 
+/// Share of frames in which a foot or hand stands and the source's doesn't, or the other way round; over all of them.
 fn disagreement(contacts: &[Contact], motion: &Motion) -> f64 {
     let stands = |bodies: &[usize], f: usize| {
         let mut row = motion.contact_bodies.iter().zip(&motion.tracks.contact[f]);
@@ -130,7 +134,8 @@ fn disagreement(contacts: &[Contact], motion: &Motion) -> f64 {
     Spread::of(differs).mean
 }
 
-/// A foot's speed from a frame to the next is that of the lowest of its bodies.
+/// Mean horizontal speed of what the source has standing still, m/s. A foot's speed is that of its lowest body, at that
+/// body's point on the ground that moves least: a foot may roll.
 fn foot_skate(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
     let qpos = &motion.qpos;
     let mut twists = vec![None; qpos.len()];
@@ -140,6 +145,7 @@ fn foot_skate(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64
         .filter(|(_, f)| f + 1 < qpos.len());
     let speeds = pairs.filter_map(|(contact, f)| {
         let poses = &motion.bodies[f];
+        // Forward differences, once for all contacts of a frame.
         let twists = twists[f].get_or_insert_with(|| {
             let onward = skeleton.differentiate(&qpos[f], &qpos[f + 1], 1.0 / motion.fps);
             skeleton.twists(&qpos[f], &onward)

@@ -10,7 +10,7 @@ use super::input::Input;
 use super::model::Model;
 use super::qpos::{CycleStep, vector};
 use super::rotation::{exp, heading, log};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use crate::motion::Cycle;
 use crate::skeleton::Joint;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -126,15 +126,12 @@ fn joint_gap(goals: &Goals, model: &Model) -> f64 {
 
 /// The warning `loop-gap` of a loop whose joints don't close.
 fn problem(joint_gap: f64) -> Option<Problem> {
-    (joint_gap > NOTICEABLE).then(|| Problem {
-        id: "loop-gap".to_owned(),
-        severity: Severity::Warning,
-        message: format!(
-            "the loop doesn't close: a joint is {:.0}° off where the last frame meets the first; the gap was spread over \
-             the frames around it. Import the clip as one that ends if it isn't meant to repeat",
-            joint_gap.to_degrees()
-        ),
-    })
+    let message = format!(
+        "the loop doesn't close: a joint is {:.0}° off where the last frame meets the first; the gap was spread over the \
+         frames around it; import the clip as one that ends if it isn't meant to repeat",
+        joint_gap.to_degrees()
+    );
+    (joint_gap > NOTICEABLE).then(|| Problem::warning("loop-gap", message))
 }
 
 /// From the last frame to the first one carried on by the cycle.

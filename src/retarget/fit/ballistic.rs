@@ -6,7 +6,7 @@
 
 use super::span::Flight;
 use super::trajectory::{Trajectory, share};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use crate::retarget::anchor::Anchor;
 use crate::retarget::goals::Goals;
 use crate::retarget::model::Model;
@@ -120,12 +120,10 @@ pub(super) fn shift_goals(
 
 /// The note `flight-corrected` of flights that were shifted far, by up to so many metres.
 pub(super) fn problem(farthest: f64) -> Option<Problem> {
-    (farthest > NOTED).then(|| Problem {
-        id: "flight-corrected".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "a flight wasn't a free fall, so the body was shifted by up to {:.0} cm in the air; this adds to its distance from the source",
-            farthest * 100.0
-        ),
-    })
+    let message = format!(
+        "a flight wasn't a free fall, so the body was shifted by up to {:.0} cm in the air; this adds to its distance from \
+         the source",
+        farthest * 100.0
+    );
+    (farthest > NOTED).then(|| Problem::note("flight-corrected", message))
 }

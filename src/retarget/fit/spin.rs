@@ -3,7 +3,7 @@
 use super::span::Flight;
 use super::torque_free::{Step, TorqueFreeFlight, Turns, mean_momentum, steps, turn};
 use super::trajectory::{Trajectory, share};
-use crate::clip::{Problem, Severity};
+use crate::clip::Problem;
 use crate::retarget::anchor::Anchor;
 use crate::retarget::goals::Goals;
 use crate::retarget::model::Model;
@@ -180,14 +180,12 @@ pub(super) fn problem(farthest: f64, all: bool) -> Option<Problem> {
     } else {
         "; a flight that would need more keeps some of the change"
     };
-    (farthest > NOTED).then(|| Problem {
-        id: "spin-corrected".to_owned(),
-        severity: Severity::Note,
-        message: format!(
-            "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air{rest}; this adds to its distance from the source",
-            farthest.to_degrees()
-        ),
-    })
+    let message = format!(
+        "in a flight the body's spin changed with nothing to push on, so it was turned by up to {:.0} degrees in the air\
+         {rest}; this adds to its distance from the source",
+        farthest.to_degrees()
+    );
+    (farthest > NOTED).then(|| Problem::note("spin-corrected", message))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Clips of few frames get more of them: between frames that are far apart a body's velocity is uncertain, most of all in
 //! flight.
 
-use crate::clip::{Clip, Problem, Severity};
+use crate::clip::{Clip, Problem};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -33,24 +33,18 @@ pub(super) fn raise(
         Some(Ok(resampled)) => {
             let own = own.start * times..(own.end - 1) * times + 1;
             let message = format!(
-                "the clip has only {fps:.1} frames a second; the motion has {times} times as many, interpolated along smooth curves"
+                "the clip has only {fps:.1} frames a second; the motion has {times} times as many, interpolated along \
+                 smooth curves"
             );
-            (Cow::Owned(resampled), own, Some(problem(message)))
+            let note = Problem::note("few-frames", message);
+            (Cow::Owned(resampled), own, Some(note))
         }
         _ => {
             let message = format!(
-                "the clip has only {fps:.1} frames a second, and is too long to interpolate more; velocities in the motion are uncertain"
+                "the clip has only {fps:.1} frames a second, and is too long to interpolate more; velocities in the motion \
+                 are uncertain"
             );
-            (clip, own, Some(problem(message)))
+            (clip, own, Some(Problem::note("few-frames", message)))
         }
-    }
-}
-
-/// The note `few-frames`.
-fn problem(message: String) -> Problem {
-    Problem {
-        id: "few-frames".to_owned(),
-        severity: Severity::Note,
-        message,
     }
 }

@@ -3,7 +3,7 @@
 //! Games move such a clip by themselves; physics can't walk on a treadmill that isn't there. While a foot is down it slides
 //! backward at the speed of the travel that was taken out, so that speed can be read off the feet.
 
-use crate::clip::{LoopMode, Problem, Severity};
+use crate::clip::{LoopMode, Problem};
 use crate::retarget::end_effector::soles;
 use crate::retarget::goals::Goals;
 use crate::retarget::model::Model;
@@ -53,14 +53,11 @@ pub(super) fn missing(goals: &Goals, model: &Model, setting: &Setting) -> Option
 
 /// The warning `travel-restored`.
 pub(super) fn problem(velocity: &Vector3<f64>) -> Problem {
-    Problem {
-        id: "travel-restored".to_owned(),
-        severity: Severity::Warning,
-        message: format!(
-            "the clip moves on the spot and its feet slide; travel of {:.2} m/s was added, with which they stand still",
-            velocity.norm()
-        ),
-    }
+    let message = format!(
+        "the clip moves on the spot and its feet slide; travel of {:.2} m/s was added, with which they stand still",
+        velocity.norm()
+    );
+    Problem::warning("travel-restored", message)
 }
 
 /// Whether each foot is the lower one in many frames. Each frame has the left foot's points in its first half.
