@@ -73,6 +73,7 @@ impl<'a> Fit<'a> {
     /// Fits a trajectory to the goals.
     pub fn run(&self, goals: Goals) -> Fitted {
         let (fitting, iterations) = self.first(goals);
+        // Only a trajectory that is nearly right tells when the body is in the air.
         let (flights, shifts) = flight::find(&self.trajectory(&fitting.frames));
         let (frames, problems) = match flights.is_empty() {
             true => (
@@ -107,6 +108,7 @@ impl<'a> Fit<'a> {
         shifts: &[Option<FlightShift>],
     ) -> (Vec<Vec<f64>>, Vec<Problem>) {
         let fallen = self.shifted(fitting, shifts);
+        // The spin comes after the fall, which doesn't change it: a body is shifted as a whole.
         let turns = spin::turns(&self.trajectory(&fallen.frames), flights);
         let Fitting { goals, frames } = self.turned(fallen, &turns.frames);
         // Limits come first, for a stiffer fit moves flights again.
@@ -131,6 +133,7 @@ impl<'a> Fit<'a> {
         // Goals and trajectory are shifted alike, so what flies still fits; only what leads to it has to be solved for.
         for (f, shift) in shifts.iter().enumerate() {
             let Some(shift) = shift else { continue };
+            // Targets of what stands stay; the others go along.
             let anchors = self.trajectory(&frames).stood_on(f);
             ballistic::shift_goals(self.model, &mut goals, f, &anchors, shift);
             shift.apply(&mut frames[f]);

@@ -44,8 +44,10 @@ pub(super) fn prepare<'a>(
     options::check_weights(&options.weights)?;
     let map = joint_map(clip, options)?;
     let mut problems = clip.problems.clone();
+    // A part of a take remembers what was around it: solved with that, it moves as it does in the whole.
     let (clip, own) = clip.with_margins();
     let repeats = clip.loop_mode == LoopMode::Wrap && clip.frames.len() > SHORTEST_CYCLE;
+    // Whether its cycle is long enough was told by the clip's own frames, before more are added between them.
     let (clip, own, few_frames) = rate::raise(clip, own);
     problems.extend(few_frames);
     Ok(Input {

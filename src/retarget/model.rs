@@ -177,6 +177,7 @@ impl<'a> Model<'a> {
 /// World from body after `joint`, whose axes and pivot are written to `pose`.
 fn place(joint: &Joint, before: &Isometry3<f64>, qpos: &[f64], pose: &mut Pose) -> Isometry3<f64> {
     let (q, v) = (joint.qpos, joint.dof);
+    // Where the body is after the joint, and the world axes of the joint's degrees of freedom.
     let (after, axes, count): (Isometry3<f64>, [Vector3<f64>; 3], usize) = match joint.kind {
         JointKind::Free => {
             // MuJoCo's free joint: position in world axes, rotation about the body's own axes through its origin.
@@ -233,6 +234,7 @@ fn shape_points(body: usize, rest: &Isometry3<f64>, shape: &Shape) -> Vec<Contac
     match shape {
         Shape::Sphere { center, radius } => vec![round(center, *radius)],
         Shape::Capsule { a, b, radius } => [a, b].map(|end| round(end, *radius)).into(),
+        // A convex shape touches a plane at these points first, so no others are needed.
         Shape::Box { pose, half } => (0..8)
             .map(|i: usize| {
                 let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };

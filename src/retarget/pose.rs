@@ -120,6 +120,7 @@ fn orientations(
         body: bind.body,
         weight: weight::of(bind.slot, multiples).1,
     };
+    // A body that is fixed to its parent turns with it, and has no say of its own.
     let moves = |body: usize| {
         !model.chains[body].is_empty() && !model.skeleton.bodies[body].joints.is_empty()
     };
@@ -178,6 +179,7 @@ impl<'a> Builder<'a> {
 
     /// Directions of the source's limbs in the frame of the root at `qpos`.
     fn directions(&self, source: &[Isometry3<f64>], qpos: &[f64]) -> LimbDirections {
+        // Seen from the root, for only the limb's own motion is the hinges' to make.
         let root = quaternion(qpos, 3);
         arms_and_legs().map(|limb| {
             let [a, b, c] = limb.map(|slot| self.scaled.point(source, slot));
@@ -240,6 +242,7 @@ impl<'a> Builder<'a> {
         let ours = self.skeleton.slots.get(&hip);
         match (ours, self.scaled.point(source, hip)) {
             (Some(body), Some(theirs)) => {
+                // Only sideways and forward: in height, feet are where the ground is.
                 let offset = bodies[*body].translation.vector - theirs;
                 Vector3::new(offset.x, offset.y, 0.0)
             }

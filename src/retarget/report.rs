@@ -115,6 +115,7 @@ fn standing(contact: &Contact) -> impl Iterator<Item = usize> + '_ {
 /// Mean height above the ground of what the source has standing there, metres.
 fn float(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
     let height = |f: usize, bodies: &[usize]| skeleton.lowest_point_of(&motion.bodies[f], bodies);
+    // Depth is measured by itself; here it counts as no height.
     let heights = contacts
         .iter()
         .flat_map(|c| standing(c).map(move |f| height(f, &c.bodies).max(0.0)));
@@ -127,6 +128,7 @@ fn disagreement(contacts: &[Contact], motion: &Motion) -> f64 {
         let mut row = motion.contact_bodies.iter().zip(&motion.tracks.contact[f]);
         row.any(|(body, stands)| *stands && bodies.contains(body))
     };
+    // Every frame of every foot and hand counts once.
     let differs = contacts.iter().flat_map(|c| {
         let touches = c.touches.iter().enumerate();
         touches.map(|(f, touches)| f64::from(*touches != stands(&c.bodies, f)))
@@ -150,6 +152,7 @@ fn foot_skate(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64
             let onward = skeleton.differentiate(&qpos[f], &qpos[f + 1], 1.0 / motion.fps);
             skeleton.twists(&qpos[f], &onward)
         });
+        // A foot rolls from heel to toes: the body on the ground counts.
         let height = |b: &usize| skeleton.lowest_point_of(poses, &[*b]);
         let lowest = contact
             .bodies

@@ -61,6 +61,7 @@ pub(super) fn finish(
     let contact = contact(model, &anchors, &contact_bodies);
     let draft = draft(&input.clip, cycle, frames, contact, contact_bodies);
     let mut motion = Motion::from_poses(model.skeleton, draft);
+    // The report measures what was made: bodies and tracks of the motion, not the solver's own.
     let measured = measured(model, &effectors, &contacts, &source, setting);
     let map = report::mapped(&input.clip, &input.map);
     let report = report::report(model.skeleton, &source, &measured, &motion, map, problems);

@@ -61,6 +61,7 @@ impl Source {
         let known = |slot: &Slot| !toes.contains(slot) || skeleton.slots.contains_key(slot);
         let slots = map.matches.iter().map(|(slot, found)| (*slot, found.joint));
         let slots: Vec<(Slot, usize)> = slots.filter(|(slot, _)| known(slot)).collect();
+        // A wrist is above the ground when the hand is on it, so the ends of fingers tell better.
         let hands = HANDS.map(|slot| fingers(clip, map.joint(slot)));
         let mut source = Source {
             points: slots.iter().map(|(slot, _)| (*slot, Vec::new())).collect(),
@@ -218,6 +219,7 @@ fn lowered(path: &[Vector3<f64>], by: f64) -> Vec<Vector3<f64>> {
 fn level(path: &[Vector3<f64>], expected: f64, leg: f64) -> f64 {
     let mut heights: Vec<f64> = path.iter().map(|p| p.z).collect();
     heights.sort_by(f64::total_cmp);
+    // The height nearest to the quantile.
     let at = (heights.len().saturating_sub(1) as f64 * QUANTILE).round() as usize;
     let lowest = heights.get(at).copied().unwrap_or(expected);
     if (lowest - expected).abs() < LIKE_REST * leg {
@@ -234,6 +236,7 @@ fn fingers(clip: &Clip, hand: Option<usize>) -> Vec<usize> {
     };
     let mut below = vec![false; clip.joints.len()];
     let mut ends = vec![true; clip.joints.len()];
+    // Joints come after their parents, so one pass tells what is below the hand and what has nothing below it.
     for (j, joint) in clip.joints.iter().enumerate() {
         if let Some(p) = joint.parent.filter(|p| *p < j) {
             below[j] = p == hand || below[p];

@@ -57,6 +57,7 @@ fn subtract_tile<const H: usize>(c: &mut [f64], a: &[f64], b: &[f64], stride: us
         // SAFETY: the processor has the features that the function is compiled for.
         return unsafe { subtract_tile_avx::<H>(c, a, b, stride) };
     }
+    // Without these instructions the same sums in the same order.
     let mut sums = [[0.0; WIDE]; H];
     for (a, b) in tile_rows::<H>(a, b, stride) {
         for (sums, a) in sums.iter_mut().zip(a) {
@@ -117,6 +118,7 @@ fn subtract_sums(c: &mut [f64], sums: &[[f64; WIDE]], stride: usize) {
 #[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; WIDE];
+    // What doesn't fill eight strands is added last.
     let (wide_a, wide_b) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
     let rest = wide_a.remainder().iter().zip(wide_b.remainder());
     let mut sum = 0.0;
