@@ -71,7 +71,7 @@ pub(super) fn paths(
         for (effector, paths) in effectors.iter().zip(&mut paths) {
             let body = goals.keypoints[effector.keypoint].body;
             let guessed = pose.bodies[body];
-            // A chain of single hinges can't be guessed well, but how the foot should be turned is known all the same. With
+            // A chain of single hinges can't be guessed well, but the foot's orientation is known. With
             // the guess alone, feet of `robot` stood 5 cm above the ground.
             let wanted = goals.orientations.iter().position(|o| o.body == body);
             let wanted = wanted.map_or(guessed.rotation, |o| goals.rotations[f][o]);

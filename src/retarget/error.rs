@@ -38,7 +38,7 @@ pub enum RetargetError {
         /// The clip's name.
         clip: String,
     },
-    /// A transform of the clip has a value that is infinite or no number.
+    /// A transform of the clip has a value that is infinite or NaN.
     NotFinite {
         /// The clip's name.
         clip: String,

@@ -1,10 +1,10 @@
 //! Stage 6, fit: one trajectory of the skeleton is fitted to its goals, with flights that fall and spin freely, inside the
 //! joint limits and above the ground.
 //!
-//! Flights can be told only from a trajectory that is nearly right, so the fit goes in steps, each from the result of the
-//! one before: a first fit to the goals; flights shifted onto their parabolas, with the frames that lead to them solved
-//! again; flights turned to spin freely, likewise; frames that break a limit solved again more stiffly; and flights put back
-//! onto the paths that fitting moved them off.
+//! Flights can be recognised only in a trajectory that is nearly right, so the fit goes in steps, each from the result of
+//! the one before. A first fit follows the goals. Then flights are shifted onto their parabolas and turned so that they spin
+//! freely, and the frames that lead to them are solved again. Frames that break a limit are solved again more stiffly. In
+//! the end flights are put back onto the paths that fitting moved them off.
 
 mod ballistic;
 mod banded;
@@ -73,7 +73,7 @@ impl<'a> Fit<'a> {
     /// Fits a trajectory to the goals.
     pub fn run(&self, goals: Goals) -> Fitted {
         let (fitting, iterations) = self.first(goals);
-        // Only a trajectory that is nearly right tells when the body is in the air.
+        // Flights are found in the fitted trajectory, for the goals may float or sink.
         let (flights, shifts) = flight::find(&self.trajectory(&fitting.frames));
         let (frames, problems) = match flights.is_empty() {
             true => (
@@ -130,10 +130,11 @@ impl<'a> Fit<'a> {
             mut goals,
             mut frames,
         } = fitting;
-        // Goals and trajectory are shifted alike, so what flies still fits; only what leads to it has to be solved for.
+        // Goals and trajectory are shifted alike, so flying frames still fit; only those that lead to them have to be solved
+        // for.
         for (f, shift) in shifts.iter().enumerate() {
             let Some(shift) = shift else { continue };
-            // Targets of what stands stay; the others go along.
+            // Targets of limbs in contact stay; the others go along.
             let anchors = self.trajectory(&frames).stood_on(f);
             ballistic::shift_goals(self.model, &mut goals, f, &anchors, shift);
             shift.apply(&mut frames[f]);
@@ -155,7 +156,7 @@ impl<'a> Fit<'a> {
             spin::turn_goals(self.model, &mut goals, f, &anchors, (&frames[f], turn));
             turn.apply(self.model.skeleton, &mut frames[f]);
         }
-        // What flies was turned with its goals, and fits them as before.
+        // Flying frames were turned with their goals, and fit them as before.
         let leads = |f: usize, _: &[f64]| turns[f].is_some_and(|turn| !turn.flies);
         self.solver(&self.least_squares(&goals))
             .repair(&mut frames, leads);
@@ -163,7 +164,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Puts flights back onto their parabolas, and those of `spin` back to one angular momentum. Fitting has moved them off
-    /// by little, so what flies is moved as it is, and what leads to it stays.
+    /// by little, so flying frames are moved as they are, and those that lead to them stay.
     fn put_back(
         &self,
         mut frames: Vec<Vec<f64>>,
@@ -237,7 +238,7 @@ impl<'a> Fit<'a> {
         Solver::new(problem, self.cycle)
     }
 
-    /// These frames with what stands in them.
+    /// These frames with their contacts.
     fn trajectory<'f>(&self, frames: &'f [Vec<f64>]) -> Trajectory<'f>
     where
         'a: 'f,

@@ -47,7 +47,7 @@ pub(super) fn prepare<'a>(
     // A part of a take remembers what was around it: solved with that, it moves as it does in the whole.
     let (clip, own) = clip.with_margins();
     let repeats = clip.loop_mode == LoopMode::Wrap && clip.frames.len() > SHORTEST_CYCLE;
-    // Whether its cycle is long enough was told by the clip's own frames, before more are added between them.
+    // The cycle has to be long enough in the clip's own frames, so this comes before more are added.
     let (clip, own, few_frames) = rate::raise(clip, own);
     problems.extend(few_frames);
     Ok(Input {
@@ -108,7 +108,7 @@ fn check_clip(clip: &Clip) -> Result<(), RetargetError> {
     Ok(())
 }
 
-/// Refuses values that are infinite or no numbers, in a frame or (`None`) in the rest pose.
+/// Refuses values that are infinite or NaN, in a frame or (`None`) in the rest pose.
 fn check_finite(
     clip: &Clip,
     frame: Option<usize>,

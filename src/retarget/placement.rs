@@ -52,7 +52,7 @@ pub(super) fn place(posed: Posed, model: &Model, setting: &Setting, first: usize
     }
 }
 
-/// Gives a clip on the spot the travel that its sliding feet tell of, with a warning.
+/// Gives a clip that walks on the spot the travel that its sliding feet show, with a warning.
 fn with_travel(
     Posed {
         mut goals,

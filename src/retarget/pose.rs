@@ -120,7 +120,7 @@ fn orientations(
         body: bind.body,
         weight: weight::of(bind.slot, multiples).1,
     };
-    // A body that is fixed to its parent turns with it, and has no say of its own.
+    // A body without joints is fixed to its parent, so its orientation can't be chosen.
     let moves = |body: usize| {
         !model.chains[body].is_empty() && !model.skeleton.bodies[body].joints.is_empty()
     };

@@ -18,15 +18,15 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// Turn of a cycle below which it goes straight, radians: 1°. Chosen: a recorded gait that is meant to be straight turns by
 /// less.
 const STRAIGHT: f64 = 0.0175;
-/// Gap of a joint from which on a warning tells of it, radians: 6°. Chosen.
+/// Gap of a joint above which the user gets a warning, radians: 6°. Chosen.
 const NOTICEABLE: f64 = 0.1;
 /// Time on either side of the seam over which the gap is faded, s. Chosen.
 const SPREAD: f64 = 0.25;
 /// The same as a share of the cycle; the smaller counts. With 0.1, DeepMimic's run, whose hand misses 20 cm, stepped by 4.4
 /// cm beyond its source, with 0.15 by 2.9.
 const SHARE: f64 = 0.15;
-/// How far closing a loop may move a point that stands without it looking as if it slid, metres. DeepMimic's run stood on
-/// its left foot alone before this was told; chosen above what closing moves a clip whose loop closes.
+/// How far closing a loop may move a point that stands without it looking as if it slid, metres. Chosen: a clip whose loop
+/// closes is moved by less. Without this rule DeepMimic's run stood on its left foot alone.
 const HIDES: f64 = 0.01;
 
 /// Goals whose loop is closed, if the clip repeats.
@@ -91,7 +91,8 @@ pub(super) fn close(goals: Goals, input: &Input, model: &Model) -> Closed {
 /// than the gap that the joints leave is part of that gap: such a cycle goes straight.
 fn cycle(goals: &Goals, joint_gap: f64) -> Cycle {
     let last = goals.frames().saturating_sub(1);
-    // The heading of what carries the first frame's orientation to the last one's. Roll and pitch have to close by themselves.
+    // Only the heading of the rotation from the first frame to the last belongs to the cycle. Roll and pitch are part of the
+    // gap.
     let turned = goals.root_rotation(last) * goals.root_rotation(0).inverse();
     let mut angle = heading(&turned);
     if angle.abs() < STRAIGHT.max(joint_gap) {

@@ -29,7 +29,7 @@ pub(super) struct Planted {
     pub effectors: Vec<EndEffector>,
 }
 
-/// Finds what stands on the ground, which is at z = 0.
+/// Finds which points stand on the ground, which is at z = 0, and moves goals along.
 pub(super) fn plant(
     mut goals: Goals,
     seam: Option<&Seam>,
@@ -65,7 +65,7 @@ pub(super) fn plant(
 }
 
 /// The source's contact of a limb as far as it decides when the limb stands, by frame: a hand's everywhere; a foot's only
-/// where closing a seam moved the foot so far that its own speed doesn't tell any more.
+/// where closing a seam moved the foot so far that its own speed means nothing.
 fn believed(
     contacts: &[SourceContact],
     effector: &EndEffector,

@@ -20,7 +20,7 @@ const SLOWEST: f64 = 0.5;
 const FARTHEST: f64 = 0.35;
 /// … and one that is off by less than this is corrected whatever its height, leg lengths.
 const CLOSE: f64 = 0.04;
-/// Shift from which on a note tells of it, metres. Chosen.
+/// Shift above which the user gets a note, metres. Chosen.
 const NOTED: f64 = 0.03;
 
 /// How a frame's body is shifted.
@@ -61,8 +61,8 @@ pub(super) fn shifts(trajectory: &Trajectory, flights: &[Flight]) -> Vec<Option<
     shifts
 }
 
-/// From the frame before a flight to the one after it: how far the centre of mass is from its parabola, metres; `None` if so
-/// far that the flight is none.
+/// From the frame before a flight to the one after it: how far the centre of mass is from its parabola, metres; `None` if it
+/// is so far that this is no flight.
 pub(super) fn off_parabola(
     trajectory: &Trajectory,
     (a, b): (i64, i64),

@@ -273,7 +273,7 @@ fn eliminate(rows: &mut [f64], n: usize, stride: usize) -> bool {
         for i in 0..height {
             let (above, below) = strip.split_at_mut((i + 1) * stride);
             let row = &mut above[i * stride + top + i..i * stride + end];
-            // A pivot that isn't positive, or is no number: the system isn't positive definite.
+            // A pivot that is NaN, or not positive, means that the system isn't positive definite.
             let pivot = row[0];
             if pivot.is_nan() || pivot <= 0.0 {
                 return false;

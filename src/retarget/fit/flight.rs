@@ -1,8 +1,8 @@
 //! Flights: where the body is in the air, and in which frame each flight begins and ends.
 //!
-//! That a body is clear of the ground is easy to see; when it stops pushing is not. So a flight may have any of several
-//! lengths, and the one counts with which the body, falling and spinning freely, changes its speed least where it leaves the
-//! ground and comes down.
+//! It is easy to see when a body is clear of the ground, and hard to see when it stops pushing. So a flight may have any of
+//! several lengths. The one is chosen with which the body, falling and spinning freely, changes its speed least at take-off
+//! and landing.
 
 use super::ballistic::{self, FlightShift};
 use super::span::Flight;
@@ -57,7 +57,7 @@ fn in_the_air(trajectory: &Trajectory, low: &[f64]) -> Vec<Flight> {
     let begins = |f: &i64| is_up(*f) == Some(false) && is_up(f + 1) == Some(true);
     let starts = (0..count).filter(begins);
     let whole = starts.map(|a| (a, a + 1 + run(a + 1, 1, true)));
-    // A flight that begins or ends outside of the clip has no speed to be told by.
+    // The speed of a flight that begins or ends outside of the clip is unknown.
     let known = whole.filter(|(a, b)| b - a <= count && is_up(*b) == Some(false));
     let high = |(a, b): &(i64, i64)| {
         let mut heights = (a + 1..*b).filter_map(|i| trajectory.locate(i));

@@ -10,19 +10,19 @@ use crate::retarget::model::Model;
 use crate::skeleton::Skeleton;
 use nalgebra::UnitQuaternion;
 
-/// Turn of a flight beyond which it would be another motion; such a flight stays as it is. Radians. Chosen: turned by half a
-/// radian, DeepMimic's backflip is 3.6 cm from its source in the mean instead of 2.4.
+/// Largest turn of a flight; beyond it, the flight would be another motion, and stays as it is. Radians. Chosen: turned by
+/// half a radian, DeepMimic's backflip is 3.6 cm from its source in the mean instead of 2.4.
 const FARTHEST: f64 = 0.5;
 /// By how much such a flight is turned for a body that is to perform it, radians. With half a radian, DeepMimic's backflip
 /// comes down too fast to stand (survival 0.97 and 0.94 with two seeds); with 0.3 three seeds gave 0.97, 0.97 and 0.94,
 /// nearer to the source.
 const PART: f64 = 0.3;
-/// Turn from which on not even that helps, for the source's spin comes from elsewhere. Radians. Chosen.
+/// Needed turn above which even that doesn't help: the source's spin is no spin of a free body. Radians. Chosen.
 const ELSEWHERE: f64 = 1.0;
-/// How many times as far what doesn't stand turns before and after a flight. Chosen: trunk, arms and head have about half of
-/// the body's inertia, and legs that stand don't turn.
+/// Factor of the turn before and after a flight, where only trunk, arms and head turn, and legs stand. Chosen: the former
+/// have about half of the body's inertia.
 const LEADS: f64 = 2.0;
-/// Turn from which on a note tells of it, radians. Chosen.
+/// Turn above which the user gets a note, radians. Chosen.
 const NOTED: f64 = 0.1;
 
 /// How a frame's body is turned about its centre of mass.
@@ -152,7 +152,7 @@ impl Spins {
     }
 }
 
-/// Turns the targets of frame `f` about the centre of mass of its pose `qpos`; what stands by `anchors` keeps its own.
+/// Turns the targets of frame `f` about the centre of mass of its pose `qpos`; limbs that `anchors` hold keep theirs.
 pub(super) fn turn_goals(
     model: &Model,
     goals: &mut Goals,

@@ -1,7 +1,7 @@
 //! Rotation with nothing to push on: the turns by which a body keeps its angular momentum in flight.
 //!
 //! The body is turned as a whole about its centre of mass, by a rotation δ(t) that gives it the same angular momentum L̄ in
-//! every step and is none at both ends of the flight. For small turns I(t) δ̇ = L̄ − L(t), so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L. From
+//! every step and vanishes at both ends of the flight. For small turns I(t) δ̇ = L̄ − L(t), so L̄ = (∫ I⁻¹)⁻¹ ∫ I⁻¹ L. From
 //! there L̄ is found by shooting: what is left of δ at the end tells how far L̄ is off (Newton's method).
 
 use crate::retarget::qpos::{put_quaternion, quaternion, vector};
@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 /// Most corrections of the momentum of a flight. Chosen: Newton's method takes a few, and what takes more has no solution
 /// nearby.
 const SHOTS: usize = 12;
-/// Most corrections of the turn of a step; chosen likewise.
+/// Most corrections of the turn of a step. Chosen for the same reason.
 const CORRECTIONS: usize = 16;
 /// What may be left of the turn at the end of a flight, radians. Chosen well below what is seen or felt.
 const LEFT_AT_END: f64 = 1e-5;
@@ -46,7 +46,7 @@ impl TorqueFreeFlight<'_> {
         )?)?)
     }
 
-    /// The turns that end with none, for a momentum near to this one.
+    /// The turns that vanish at the end, with a momentum near to this one.
     fn shoot_at_rest(&self, mut momentum: Vector3<f64>) -> Option<Turns> {
         let (mut turns, mut off) = self.shoot(&momentum)?;
         let mut known: Option<Matrix3<f64>> = None;
@@ -94,7 +94,7 @@ impl TorqueFreeFlight<'_> {
         let (skeleton, fps) = (self.skeleton, self.fps);
         let mut turns = vec![UnitQuaternion::identity()];
         for pair in self.frames.windows(2) {
-            // The frame before, turned as it was found, and the next one, turned likewise to begin with.
+            // The frame before has its turn already; the next one starts with the same turn.
             let mut by = *turns.last()?;
             let mut pair = pair.to_vec();
             turn(skeleton, &mut pair[0], &by);

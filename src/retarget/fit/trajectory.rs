@@ -13,7 +13,7 @@ use nalgebra::Isometry3;
 /// three frames.
 pub(super) const NEAR: f64 = 0.05;
 
-/// A trajectory of poses and what stands in it. Indices go beyond its frames where it repeats: −1 is the last frame of the
+/// A trajectory of poses and its contacts. Indices go beyond its frames where it repeats: −1 is the last frame of the
 /// cycle before.
 pub(super) struct Trajectory<'a> {
     /// The skeleton.
@@ -62,7 +62,7 @@ impl Trajectory<'_> {
         (NEAR * self.fps).round() as i64
     }
 
-    /// What stands in frame `f` or within [`NEAR`] of it: a foot stays where it stood until it flies.
+    /// The anchors of frame `f` and of those within [`NEAR`] of it: a foot stays in place until the flight begins.
     pub fn stood_on(&self, f: usize) -> Vec<Anchor> {
         let reach = self.near();
         let around = (f as i64 - reach..=f as i64 + reach).filter_map(|index| self.locate(index));
@@ -72,8 +72,8 @@ impl Trajectory<'_> {
     }
 }
 
-/// How far the body in `slot` goes along when the whole body is moved, 0 to 1. In flight everything does. On the ground,
-/// what stands stays, and the knee or elbow above it goes half the way.
+/// How far the body in `slot` goes along when the whole body is moved, 0 to 1. In flight every body does. On the ground, a
+/// foot or hand in contact stays, and the knee or elbow above it goes half the way.
 pub(super) fn share(model: &Model, slot: Slot, anchors: &[Anchor], flies: bool) -> f64 {
     let end = end_below(slot).unwrap_or(slot);
     // A shin belongs to its foot, a forearm to its hand; all other bodies to themselves.

@@ -1,8 +1,8 @@
 //! Feet in the air hang on the skeleton's own legs.
 //!
-//! On the ground a foot is where the scaled source's is, or steps would slide. A leg of other proportions gets there by
-//! bending otherwise than the source's, the more so the further it is folded. In the air nothing asks for that: there the
-//! ankle goes to the end of a leg that has the source's directions and the skeleton's lengths.
+//! On the ground a foot is where the scaled source's is, or steps would slide. A leg of other proportions has to bend
+//! otherwise than the source's to get there, and most when it is folded far. In the air that isn't needed: there the ankle
+//! goes to the end of a leg that has the source's directions and the skeleton's lengths.
 
 use crate::retarget::fade::{ramp, smoothstep};
 use crate::retarget::goals::Goals;

@@ -1,6 +1,6 @@
 //! Clips that walk on the spot get their travel back.
 //!
-//! Games move such a clip by themselves; physics can't walk on a treadmill that isn't there. While a foot is down it slides
+//! A game moves such a character itself, but a simulated one has to push against the ground. While a foot is down it slides
 //! backward at the speed of the travel that was taken out, so that speed can be read off the feet.
 
 use crate::clip::{LoopMode, Problem};

@@ -56,7 +56,8 @@ impl<'a> Guesser<'a> {
                 *rotation = free.unwrap_or(reached[b].rotation);
             }
         }
-        // The root was at the origin so far. It goes where the hip joints are right, by whatever joints they hang on it.
+        // The root was at the origin so far. It goes to where the hip joints are in the right place, whichever joints are
+        // between.
         let shift = hips - self.hip_middle(&reached);
         qpos[..3].copy_from_slice(shift.as_slice());
         let shift = Translation3::from(shift);

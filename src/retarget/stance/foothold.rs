@@ -3,8 +3,8 @@
 use crate::retarget::fade::{ramp, smoothstep};
 use nalgebra::Vector3;
 
-/// Speed at which a frame has 1/e of the say of one at rest in where the point stands, leg lengths per second. Chosen: 7
-/// cm/s for a leg of 0.9 m, at which a source counts as still.
+/// Speed at which a frame has 1/e of the weight of one at rest in the mean that gives the place, leg lengths per second.
+/// Chosen: 7 cm/s for a leg of 0.9 m, at which a source counts as still.
 const SLOW: f64 = 0.08;
 /// Distances from its place from which on a point begins to slide with the source, and does so wholly, leg lengths. Chosen:
 /// no stance drags a foot further than that. With twice the width, no clip but one gained, and that little.
@@ -21,7 +21,7 @@ const LEAST: [f64; 2] = [1e-9, 1e-3];
 pub(super) struct Track<'a> {
     /// Its centre, world, metres.
     pub path: &'a [Vector3<f64>],
-    /// How near the ground it stands: 0 to 1, no number where it doesn't stand.
+    /// How near the ground it stands: 0 to 1, NaN where it doesn't stand.
     pub weights: &'a [f64],
     /// Metres.
     pub radius: f64,
@@ -98,8 +98,8 @@ impl Stance<'_> {
         shift * self.fps / ((b - a).max(1) as f64 * self.leg)
     }
 
-    /// Where the point rests: the mean of its path over the last half second in which it is low and slow. What was before
-    /// has no say, so that a stance is the same in a clip that begins in its midst.
+    /// Where the point rests: the mean of its path over the last half second in which it is low and slow. Earlier frames
+    /// don't count, so that a stance is the same in a clip that begins in the middle of it.
     fn rest(&self) -> Vector3<f64> {
         let enough = LAST * self.fps;
         let (mut sum, mut total) = (Vector3::zeros(), 0.0);

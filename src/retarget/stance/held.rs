@@ -100,8 +100,7 @@ impl Limb<'_> {
         self.touches.as_ref().is_some_and(|touches| touches[f])
     }
 
-    /// How near the ground a point of a foot stands, by frame: it rests low, or the source says so. No number where it
-    /// doesn't stand.
+    /// How near the ground a point of a foot stands, by frame: it rests low, or the source says so. NaN where it doesn't stand.
     fn sole_weights(&self, model: &Model, k: usize, setting: &Setting) -> Vec<f64> {
         let radius = model.contact_points[self.effector.points[k]].radius;
         let path = &self.paths[k];

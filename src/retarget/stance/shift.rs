@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 /// Sum of its points' weights from which on a limb counts as standing.
 const STANDS: f64 = 0.25;
-/// Root mean square distance of standing points from their middle from which on they tell of a turn, metres.
+/// Root mean square distance of standing points from their mean above which they determine a turn, metres.
 const APART: f64 = 0.03;
 /// Largest turn, radians: more would be a foot that has turned, not one that was carried over wrongly.
 const LARGEST_TURN: f64 = 0.4;
@@ -55,7 +55,7 @@ fn fit(held: &[Held], key: &Vector3<f64>) -> Option<LimbShift> {
         sin += h.weight * a.perp(&b);
         spread += h.weight * a.norm_squared();
     }
-    // Points on one spot tell of no turn.
+    // Points on one spot don't determine a turn.
     let tells = spread > total * APART * APART;
     let turn = if tells {
         sin.atan2(cos).clamp(-LARGEST_TURN, LARGEST_TURN)
