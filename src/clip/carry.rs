@@ -1,9 +1,12 @@
-//! Moves over the ground.
+//! Moves over the ground: a turn about Z and a horizontal shift.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
-/// The move over the ground, a turn about Z and a horizontal shift, that brings `a` nearest to `b` in the least-squares
-/// sense (planar Procrustes).
+/// The move over the ground that brings the points `a` nearest to `b` in the least-squares sense (planar Procrustes). Both
+/// have the same number of points, world axes, metres.
+///
+/// With both sets centred and their horizontal parts as complex numbers, the sum of |b − a·e^{iφ}|² is least where φ is the
+/// angle of Σ ā·b: its real part is `dot`, its imaginary part `cross`.
 pub(crate) fn carry(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Isometry3<f64> {
     let (from, to) = (centre(a), centre(b));
     let (mut cross, mut dot) = (0.0, 0.0);

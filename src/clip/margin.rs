@@ -1,41 +1,44 @@
-//! What goes on around a part that was cut out of a longer take.
+//! What happens around a part that was cut out of a longer take.
 
 use super::{Clip, LoopMode};
 use nalgebra::Isometry3;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Most that is kept of what was before and after a part, s: longer than all but a few stances.
+/// Seconds that are kept before and after a part. Chosen: a stance of walking lasts about 0.6 s, so that only someone who
+/// stands still stands longer.
 const MOST: f64 = 2.0;
-/// Speed of all joints, root mean square, from which on a step is a cut and no motion: times the largest distance of a
-/// joint from the first, which is about a metre in a figure of a man's size, per second.
+/// A step between frames faster than this is a cut, not motion: root mean square over the joints, in figure sizes (the largest
+/// distance of a joint from the first, about a metre in an adult) per second. Chosen: only a
+/// sprint is as fast.
 const CUT: f64 = 8.0;
 
-/// Frames around those of a clip, at the clip's rate: they aren't part of the motion, but tell what its ends belong to.
-/// A foot that stands in the first frame has its place from when it came down, so that a part of a take becomes the
-/// same motion as that part of the whole.
+/// Frames around those of a clip, at the clip's rate. They aren't part of the motion, but show what its ends belong to: a foot
+/// on the ground in the first frame stays where it came down before. So a part of a take becomes the same motion as that
+/// part of the whole take.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Margin {
-    /// Frames that lead to the first.
+    /// Frames that lead to the first, in order of time: local transforms, as in [`Clip::frames`].
     pub before: Vec<Vec<Isometry3<f64>>>,
     /// Frames that go on from the last.
     pub after: Vec<Vec<Isometry3<f64>>>,
 }
 
 impl Margin {
-    /// Frames of a margin that covers `duration` seconds, as far as that is worth keeping.
+    /// How many frames are kept as a margin of `duration` seconds. A millionth of a frame makes up for rounding.
     pub(crate) fn frames(duration: f64, fps: f64) -> usize {
         (duration.clamp(0.0, MOST) * fps + 1e-6) as usize
     }
 
+    /// All transforms, to be changed.
     pub(crate) fn transforms_mut(&mut self) -> impl Iterator<Item = &mut Isometry3<f64>> {
         self.before.iter_mut().chain(&mut self.after).flatten()
     }
 }
 
 impl Clip {
-    /// The clip with its margins as frames, and which frames are its own. A margin ends where it was cut itself. A clip
-    /// that loops goes on with itself, so that what was around it doesn't matter.
+    /// The clip with its margins as frames, and which frames are its own. A margin ends at a cut in it. A clip that loops goes
+    /// on with itself, so that what was around it doesn't matter.
     pub(crate) fn with_margins(&self) -> (Cow<'_, Clip>, Range<usize>) {
         let own = self.frames.len();
         let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
@@ -56,7 +59,7 @@ impl Clip {
         (Cow::Owned(clip), before..before + own)
     }
 
-    /// How many of these frames go on from `end` and from each other without a cut.
+    /// How many frames of `margin` continue `end`, and each other, without a cut.
     fn joined<'a>(
         &'a self,
         end: &'a [Isometry3<f64>],

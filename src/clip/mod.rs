@@ -1,4 +1,4 @@
-//! A clip: a tree of joints and their sampled rigid local transforms, in canonical space.
+//! A clip: a tree of joints and their sampled rigid local transforms, in canonical space (Z up, X forward, metres).
 
 mod carry;
 pub mod edit;
@@ -20,15 +20,16 @@ pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-/// One joint of a clip's tree. Parents stand before their children.
+/// One joint of a clip's tree. Parents come before their children.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
+    /// Its name in the source; several joints may have the same.
     pub name: String,
     /// Index of the parent joint; `None` for a root.
     pub parent: Option<usize>,
     /// Rest transform, parent from joint, in metres.
     pub rest: Isometry3<f64>,
-    /// The bone of a humanoid that the file says this is, in the words of VRM, e.g. `leftUpperLeg`.
+    /// The bone of a humanoid that the source says this is, by VRM's name for it, e.g. `leftUpperLeg`.
     pub bone: Option<String>,
 }
 
@@ -36,9 +37,9 @@ pub struct Joint {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LoopMode {
-    /// The last frame is the first frame of the next cycle, moved on by the cycle's travel.
+    /// It repeats: the last frame is the first frame of the next cycle, moved over the ground by the cycle's travel.
     Wrap,
-    /// It is performed once, and then ends.
+    /// It plays once and ends.
     Clamp,
 }
 
@@ -51,8 +52,9 @@ pub struct Source {
     pub sha256: String,
     /// `fbx`, `gltf`, `bvh`, `amc` or `deepmimic`.
     pub format: String,
+    /// Name of the take in the file.
     pub take: String,
-    /// Frame rate that the file states, in Hz.
+    /// Frame rate that the file states or its keys keep, Hz.
     pub fps: f64,
     /// Up axis of the file, e.g. `+Y`.
     pub up_axis: String,
@@ -62,19 +64,24 @@ pub struct Source {
 
 /// A joint tree and its motion, sampled at a constant rate.
 ///
-/// Transforms are rigid: scale in the source file is resolved so that every joint's world position is exact.
+/// Transforms are rigid: scale in the source file is resolved so that every joint has the world position that it has there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
+    /// Name of the clip: the source's file name without its extension, unless somebody changed it.
     pub name: String,
-    /// Frames per second.
+    /// Frames per second, Hz.
     pub fps: f64,
+    /// What happens at its end.
     pub loop_mode: LoopMode,
+    /// The joint tree, parents first.
     pub joints: Vec<Joint>,
-    /// `frames[f][j]`: transform of joint `j` in its parent at time `f / fps`.
+    /// `frames[f][j]`: transform of joint `j` in its parent, metres, at time `f / fps` seconds.
     pub frames: Vec<Vec<Isometry3<f64>>>,
     /// What was around the frames, where they are a part of a longer take.
     pub margin: Margin,
+    /// Where it comes from.
     pub source: Source,
+    /// What the importer and later edits found out, guessed or left out.
     pub problems: Vec<Problem>,
 }
 
@@ -84,7 +91,10 @@ impl Clip {
         self.frames.len().saturating_sub(1) as f64 / self.fps
     }
 
-    /// World transforms of all joints at frame `frame`.
+    /// World transforms of all joints at frame `frame`, parents first, metres.
+    ///
+    /// # Panics
+    /// If the clip has no such frame.
     pub fn world(&self, frame: usize) -> Vec<Isometry3<f64>> {
         self.world_from(&self.frames[frame])
     }

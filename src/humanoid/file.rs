@@ -5,7 +5,7 @@ use crate::clip::Joint;
 use std::collections::BTreeMap;
 
 impl HumanoidMap {
-    /// The map as JSON text: slot to joint name, in the order of the slots.
+    /// The map as JSON text to edit: an object from slot to the joint's name in `joints`, in the order of the slots.
     pub fn to_json(&self, joints: &[Joint]) -> String {
         let names = self.matches.iter().filter_map(|(slot, found)| {
             let joint = joints.get(found.joint)?;
@@ -19,10 +19,12 @@ impl HumanoidMap {
         format!("{{\n{}\n}}\n", lines.join(",\n"))
     }
 
-    /// Reads what [`HumanoidMap::to_json`] wrote, perhaps edited. Slots that are left out, empty or `null` stay empty.
+    /// Reads a map that [`HumanoidMap::to_json`] wrote and somebody may have edited. `joints` are those of the clip. Slots
+    /// that are left out, `""` or `null` stay empty.
     ///
     /// # Errors
-    /// [`Error`] names the slot or joint that doesn't fit.
+    /// An [`Error`] for text that isn't such an object, slots or joints that don't exist, names that several joints have, a
+    /// joint in two slots, and required slots that are empty.
     pub fn from_json(text: &str, joints: &[Joint]) -> Result<HumanoidMap, Error> {
         let named: BTreeMap<String, Option<String>> =
             serde_json::from_str(text).map_err(|e| Error::MapSyntax {

@@ -1,17 +1,19 @@
-//! Arms and legs by name: the chain of joints whose names fit best and which stand below each other.
+//! Arms and legs by name: the chain of joints, each below the one before, whose names fit best.
 
 use super::names::{Label, Part, Side};
 use super::tree::Tree;
 use super::{HumanoidMap, Slot};
 use crate::clip::Joint;
 
-/// Candidates kept per part, so that a file with thousands of equal names costs no more than a rig.
+/// Candidates kept per part. Chosen: a rig has a few joints of a name, and the search tries all pairs of candidates, which a
+/// hostile file with thousands of equal names must not multiply.
 const CANDIDATES: usize = 12;
 
-/// What a joint loses in confidence when it stands outside the chain of its limb.
+/// What a joint outside the chain of its limb loses in confidence. Chosen: below every full match (0.9 or 1), so that a
+/// joint in the chain wins.
 const APART: f64 = 0.4;
 
-/// What a name has to score to be believed without the rest of its limb.
+/// Least score of a name that is believed without the rest of its limb. Chosen: only names with one meaning score that much.
 const SURE: f64 = 0.9;
 
 type Candidate = (usize, f64);
@@ -24,8 +26,9 @@ struct Limb {
     /// Parts of root, bend and end; slots for them.
     parts: [Part; 3],
     slots: [Slot; 3],
-    /// A part before the root (clavicle) and one beyond the end (toes), which may be missing.
+    /// An optional part before the root: the clavicle.
     before: Option<(Part, Slot)>,
+    /// An optional part beyond the end: the toes.
     beyond: Option<(Part, Slot)>,
 }
 
@@ -63,6 +66,7 @@ const LIMBS: [Limb; 4] = [
     },
 ];
 
+/// Fills the slots of limbs that their names tell.
 pub(super) fn find(tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut HumanoidMap) {
     for limb in &LIMBS {
         limb.find(tree, joints, labels, found);
@@ -85,7 +89,8 @@ impl Limb {
             self.single(tree, joints, labels, found);
             return;
         };
-        // A chain that is whole vouches for names that alone could mean something else.
+        // A name such as `Leg` may mean the thigh, the shin or the foot. In a complete chain its place settles which, so the
+        // score moves halfway to certainty.
         let whole = chain.iter().all(|link| link.is_some_and(|l| !l.2));
         let sure = |score: f64| if whole { (1.0 + score) / 2.0 } else { score };
         let said = |j: usize| format!("its name, `{}`", joints[j].name);
@@ -94,7 +99,7 @@ impl Limb {
                 continue;
             };
             let place = if apart {
-                ", though it stands apart from the limb"
+                ", though it is apart from the limb"
             } else {
                 ""
             };
@@ -105,7 +110,7 @@ impl Limb {
             let above = candidates(labels, part, self.side);
             let mut above = above.into_iter().filter(|c| tree.is_above(c.0, root));
             if let Some(best) = above.next() {
-                // Of equals the one next to the arm; others stand in the trunk.
+                // Of equally good names, the one next to the arm: the others belong to the trunk.
                 let mut nearest = above.filter(|c| c.1 == best.1 && tree.is_above(best.0, c.0));
                 let (j, score) = nearest.next_back().unwrap_or(best);
                 found.insert(slot, j, score, said(j));
@@ -121,7 +126,7 @@ impl Limb {
         }
     }
 
-    /// Links whose names leave no doubt, where there is no chain; shape has to find the others.
+    /// Without a chain, the joints whose names leave no doubt. The shape of the rest pose has to find the others.
     fn single(&self, tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut HumanoidMap) {
         let mut above: Option<usize> = None;
         for (part, slot) in self.parts.into_iter().zip(self.slots) {
@@ -135,7 +140,7 @@ impl Limb {
         }
     }
 
-    /// Best root, bend and end: joint, confidence, whether it stands apart.
+    /// The root, bend and end with the largest sum of scores. A limb needs root and bend; the end may be missing.
     fn chain(&self, tree: &Tree, joints: &[Joint], labels: &[Label]) -> Option<[Option<Link>; 3]> {
         let [roots, bends, ends] = self.parts.map(|part| candidates(labels, part, self.side));
         let mut best: Option<(f64, [Option<Link>; 3])> = None;
@@ -157,8 +162,8 @@ impl Limb {
     }
 }
 
-/// Whether `root` stands between the root of a chain with the same bend and that bend: the other one is a joint
-/// between limb and trunk (`LHipJoint`, `__UpLeg_L`).
+/// Whether `root` is between the root of a chain with the same bend and that bend. The other root is then a joint between
+/// the limb and the trunk (`LHipJoint`, `__UpLeg_L`), and `root` is nearer to where the limb bends.
 fn is_nearer(
     tree: &Tree,
     joints: &[Joint],
@@ -176,7 +181,7 @@ fn is_nearer(
     }
 }
 
-/// Whether two names differ in their number: parts of one bone, which begins with the first.
+/// Whether two names differ only in their number: they are segments of one bone, which begins at the first.
 fn are_segments(a: &str, b: &str) -> bool {
     let pick =
         |name: &str, is: fn(char) -> bool| name.chars().filter(|c| is(*c)).collect::<String>();
@@ -185,7 +190,7 @@ fn are_segments(a: &str, b: &str) -> bool {
         && pick(a, digits) != pick(b, digits)
 }
 
-/// The end of a limb: nearest below its bend, or else (feet only) one that an IK rig keeps outside of the chain.
+/// The end of a limb: the best below its bend, or else (feet only) one outside the chain, where IK rigs keep it.
 fn end_of(
     tree: &Tree,
     ends: &[Candidate],

@@ -1,7 +1,7 @@
 //! Humanoid slots: the joints that every humanoid has, whatever its rig calls them, and how they are found.
 //!
-//! What the file itself tells goes before all. Limbs are found by their names where these are telling, else by the shape
-//! of the rest pose; the trunk follows from the tree: hips are where the legs meet, the chest where the arms meet.
+//! Three sources, in order of trust: what the file itself says (VRM), names of joints, and the shape of the rest pose. Limbs
+//! are found first. The trunk follows from the tree: the hips are where the legs meet, the chest is where the arms meet.
 
 mod error;
 mod file;
@@ -27,28 +27,47 @@ pub use sides::pairs;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Slot {
+    /// Root of the trunk, where both legs meet.
     Hips,
     /// Lowest spine joint above the hips.
     Spine,
-    /// Joint of the upper trunk from which neck and shoulders spring.
+    /// Joint of the upper trunk from which the neck and the shoulders branch off.
     Chest,
+    /// Joint between the chest and the head.
     Neck,
+    /// Joint at the base of the skull.
     Head,
+    /// Left clavicle, which carries the arm.
     LeftShoulder,
+    /// Left shoulder joint.
     LeftUpperArm,
+    /// Left elbow.
     LeftLowerArm,
+    /// Left wrist.
     LeftHand,
+    /// Right clavicle, which carries the arm.
     RightShoulder,
+    /// Right shoulder joint.
     RightUpperArm,
+    /// Right elbow.
     RightLowerArm,
+    /// Right wrist.
     RightHand,
+    /// Left hip joint.
     LeftUpperLeg,
+    /// Left knee.
     LeftLowerLeg,
+    /// Left ankle.
     LeftFoot,
+    /// Left joint at the ball of the foot.
     LeftToes,
+    /// Right hip joint.
     RightUpperLeg,
+    /// Right knee.
     RightLowerLeg,
+    /// Right ankle.
     RightFoot,
+    /// Right joint at the ball of the foot.
     RightToes,
 }
 
@@ -135,17 +154,19 @@ pub struct Match {
     pub joint: usize,
     /// From 0 (a guess) to 1 (certain).
     pub confidence: f64,
+    /// Why this joint, for people: its name, its place, or that the file says so.
     pub reason: String,
 }
 
 /// Which joint stands for which slot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HumanoidMap {
+    /// The joint of every slot that has one.
     pub matches: BTreeMap<Slot, Match>,
 }
 
 impl HumanoidMap {
-    /// Index of the joint in `slot`.
+    /// Index of the joint in `slot`; `None` if it is empty.
     pub fn joint(&self, slot: Slot) -> Option<usize> {
         self.matches.get(&slot).map(|found| found.joint)
     }
@@ -162,8 +183,8 @@ impl HumanoidMap {
     }
 }
 
-/// The slots whose joints can be found in any joint tree, few or none in one that is no humanoid: where to begin a map
-/// by hand.
+/// The slots whose joints can be found, in any joint tree: few or none in a figure that isn't a humanoid. A map that is
+/// written by hand can start from them.
 pub fn partial(joints: &[Joint]) -> HumanoidMap {
     let tree = tree::Tree::new(joints);
     let mut found = told::find(joints);
@@ -175,7 +196,7 @@ pub fn partial(joints: &[Joint]) -> HumanoidMap {
     found
 }
 
-/// The slots by names and shape alone.
+/// The slots by names and shape alone: limbs by name, gaps in limbs by shape, then the trunk between the limbs.
 fn guesses(tree: &tree::Tree, joints: &[Joint]) -> HumanoidMap {
     let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
     let mut found = HumanoidMap::default();
@@ -185,11 +206,11 @@ fn guesses(tree: &tree::Tree, joints: &[Joint]) -> HumanoidMap {
     found
 }
 
-/// Finds the joint of every humanoid slot in a joint tree: those that the file tells, then from names, then from the
-/// shape of the rest pose.
+/// Finds the joint of every humanoid slot in a joint tree: by what the file says, by names, and by the shape of the rest
+/// pose, which must have Z up and should face +X.
 ///
 /// # Errors
-/// [`Error`] when a required slot stays empty or the figure stands on four legs.
+/// An [`Error`] when a slot of [`Slot::REQUIRED`] stays empty, or the figure stands on four legs.
 pub fn map(joints: &[Joint]) -> Result<HumanoidMap, Error> {
     if joints.len() < Slot::REQUIRED.len() {
         return Err(Error::TooFewJoints {

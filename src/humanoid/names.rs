@@ -29,11 +29,11 @@ pub(super) struct Label {
     pub side: Option<Side>,
     /// The name's words without prefix, side and number, written as one: `upperleg`.
     pub core: String,
-    /// It stands in no slot: an end, a finger, a helper.
+    /// It fits no slot: an end, a finger, a helper.
     pub is_foreign: bool,
 }
 
-/// Words of joints that stand in no slot: fingers, faces, ends, helpers of a rig.
+/// Words in the names of joints that fit no slot: fingers, faces, ends, helpers of a rig.
 const FOREIGN: [&str; 54] = [
     "thumb",
     "index",
@@ -122,7 +122,8 @@ const NOISE: [&str; 27] = [
     "x",
 ];
 
-/// What the core of a sided name means, best first.
+/// What the core of a name with a side may mean, with a score: 1 where rigs mean nothing else by it. Below that, chosen so
+/// that the more usual meaning wins (`leg` is the shin in more rigs than the thigh), and any name of one meaning beats both.
 fn sided(core: &str) -> &'static [(Part, f64)] {
     match core {
         "upleg" | "upperleg" | "legupper" | "legup" | "uleg" | "thigh" | "upperthigh" | "femur" => {
@@ -130,7 +131,7 @@ fn sided(core: &str) -> &'static [(Part, f64)] {
         }
         "足" => &[(Part::UpperLeg, 0.9)],
         "hip" | "hips" => &[(Part::UpperLeg, 0.8)],
-        // A joint between the hips and the leg, where there is a better one.
+        // A joint between the hips and the leg: any better name wins.
         "hipjoint" => &[(Part::UpperLeg, 0.45)],
         "lowerleg" | "leglower" | "lowleg" | "loleg" | "lleg" | "calf" | "shin" | "knee"
         | "tibia" | "crus" | "ひざ" => &[(Part::LowerLeg, 1.0)],
@@ -160,7 +161,7 @@ fn sided(core: &str) -> &'static [(Part, f64)] {
     }
 }
 
-/// What the core of a name without side means.
+/// What the core of a name without a side means, with a score.
 fn central(core: &str) -> Option<(Part, f64)> {
     match core {
         "hips" | "hip" | "pelvis" | "bassin" | "下半身" => Some((Part::Hips, 1.0)),
@@ -169,7 +170,7 @@ fn central(core: &str) -> Option<(Part, f64)> {
             Some((Part::Trunk, 1.0))
         }
         "neck" | "cou" | "首" => Some((Part::Neck, 1.0)),
-        // Parts of a neck, where there is no joint for the whole of it.
+        // Parts of a neck, for rigs without a joint for the whole of it.
         "lowerneck" => Some((Part::Neck, 0.9)),
         "upperneck" => Some((Part::Neck, 0.8)),
         "head" | "skull" | "tête" | "頭" => Some((Part::Head, 1.0)),
@@ -178,6 +179,7 @@ fn central(core: &str) -> Option<(Part, f64)> {
 }
 
 impl Label {
+    /// Takes a joint's name to pieces. Only what follows a namespace (`:`) or a path (`|`) counts.
     pub fn new(name: &str) -> Label {
         let local = name.rsplit([':', '|']).next().unwrap_or(name);
         let mut side = None;
@@ -226,10 +228,10 @@ impl Label {
     }
 }
 
-/// Parts that rigs write in capitals behind the letter of a side: `LUArm`, `RFArm`.
+/// Parts whose capitals would be split wrongly behind the letter of a side: `LUArm`, `RFArm`.
 const CAPITALS: [&str; 4] = ["uarm", "farm", "uleg", "lleg"];
 
-/// Lower-case words of a name: split at what is no letter, and where lower case turns into upper case.
+/// Lower-case words of a name, split at everything that isn't a letter and where a new word is capitalised.
 fn words(name: &str) -> Vec<String> {
     let runs = name.split(|c: char| !c.is_alphabetic());
     runs.flat_map(|run| {
@@ -244,6 +246,7 @@ fn words(name: &str) -> Vec<String> {
     .collect()
 }
 
+/// Words of a name in camel case; capitals in a row are one word: `IKFoot` is `ik`, `foot`.
 fn humps(name: &str) -> Vec<String> {
     let letters: Vec<char> = name.chars().collect();
     let mut words = vec![String::new()];

@@ -5,13 +5,16 @@ use super::tree::Tree;
 use super::{Error, HumanoidMap, Slot};
 use nalgebra::Vector3;
 
-/// Confidence in a joint that only the shape speaks for.
+/// Confidence in a joint that was found by shape alone. Chosen.
 const BY_SHAPE: f64 = 0.5;
-/// Two branches are a pair when their lengths and end heights differ by no more than this part of their length.
+/// Two branches are a pair if their lengths, and the heights of their ends, differ by no more than this fraction of their
+/// length. Chosen: rest poses are nearly symmetric, while different limbs differ by more.
 const PAIR_TOLERANCE: f64 = 0.15;
-/// A joint further from a bend than this part of the bone below it starts a bone of its own.
+/// A joint farther above a bend than this fraction of the bone below the bend starts a bone; a nearer one is a twist helper.
+/// Chosen: upper and lower bones of a limb are about equally long.
 const LIKE_BONE: f64 = 0.5;
-/// Branches of one joint that are compared.
+/// Most branches of one joint that are compared, the longest first, and most joints of a leg that are tried. Chosen, to bound
+/// the search: a figure has five limbs.
 const BRANCHES: usize = 16;
 
 pub(super) const LEFT_LEG: [Slot; 4] = [
@@ -46,7 +49,7 @@ struct Branch {
     length: f64,
 }
 
-/// Fills limbs that their names left incomplete. What is named stays, as far as the rest of its limb fits to it.
+/// Fills limbs that their names left incomplete. Named joints stay, unless the rest of their limb doesn't fit them.
 pub(super) fn complete(tree: &Tree, labels: &[Label], found: &mut HumanoidMap) {
     let reach = reaches(tree);
     let limbs: [&[Slot]; 4] = [
@@ -76,7 +79,7 @@ pub(super) fn complete(tree: &Tree, labels: &[Label], found: &mut HumanoidMap) {
     }
 }
 
-/// The links of a limb that follow from those which are known: root above bend above end.
+/// The one link of a limb that is missing, where it follows from the two others: root above bend above end.
 fn fill_gaps(
     tree: &Tree,
     reach: &[(Option<usize>, f64)],
@@ -113,7 +116,7 @@ fn fill_gaps(
     }
 }
 
-/// Puts a limb that was found by its shape into the slots that are empty. Where the named joints aren't part of it,
+/// Puts a limb that was found by its shape into the slots that are empty. Where the named joints don't form a chain with it,
 /// it takes their slots too.
 fn supplement(
     tree: &Tree,
@@ -164,7 +167,7 @@ fn branch(reach: &[(Option<usize>, f64)], start: usize) -> Branch {
     }
 }
 
-/// All pairs of mirrored branches that spring from one joint and have at least `least` joints each.
+/// All pairs of mirrored branches of one joint, of at least `least` joints each.
 fn pairs(tree: &Tree, reach: &[(Option<usize>, f64)], least: usize) -> Vec<[Branch; 2]> {
     let mut pairs = Vec::new();
     for children in &tree.children {
@@ -185,6 +188,7 @@ fn pairs(tree: &Tree, reach: &[(Option<usize>, f64)], least: usize) -> Vec<[Bran
     pairs
 }
 
+/// Whether two numbers differ by no more than the tolerance of a pair, as a fraction of `whole`.
 fn alike(a: f64, b: f64, whole: f64) -> bool {
     (a - b).abs() <= PAIR_TOLERANCE * whole && whole > 0.0
 }
@@ -196,13 +200,15 @@ fn end(tree: &Tree, branch: &Branch) -> Vector3<f64> {
         .map_or_else(Vector3::zeros, |j| tree.at[*j].coords)
 }
 
+/// Whether the ends of two branches are equally high and apart. 0.05 of their length is chosen: hands and feet of
+/// both sides are farther apart, and two chains of one limb end nearer to each other.
 fn mirrored(tree: &Tree, pair: &[Branch; 2]) -> bool {
     let [a, b] = [end(tree, &pair[0]), end(tree, &pair[1])];
     let apart = (a - b).xy().norm();
     alike(a.z, b.z, pair[0].length) && apart > 0.05 * pair[0].length
 }
 
-/// Mirrored branches that end lowest: upper leg, lower leg, foot, toes of the left, then of the right.
+/// The mirrored branches that end lowest: upper leg, lower leg, foot and toes, of the left and then of the right.
 fn legs(
     tree: &Tree,
     labels: &[Label],
@@ -228,7 +234,7 @@ fn legs(
         [Some(leg[0]), Some(leg[1]), Some(leg[2]), toes]
     };
     let (first, second) = (chain(a, &pair[0]), chain(b, &pair[1]));
-    // Hips may coincide; knees and ankles stand apart.
+    // Hip joints may be in one place, so knees and ankles count too.
     let across: Vector3<f64> = (0..3).map(|i| tree.span(b[i], a[i])).sum();
     let leads = named_first(labels, &pair).unwrap_or(across.dot(&side) > 0.0);
     Some(if leads {
@@ -238,7 +244,9 @@ fn legs(
     })
 }
 
-/// Hip, knee and ankle: two long drops of like height, and a turn at the end.
+/// Hip, knee and ankle of a branch: the three joints with the longest shorter drop (thigh and shin are about equally long),
+/// and where the foot turns away from the shin. The turn counts 0.2 against the drop's fraction of the leg. Chosen: it
+/// settles ties between ankle and ball, and no more. A branch that goes down less than half its length isn't a leg.
 fn leg_joints(tree: &Tree, branch: &Branch) -> Option<[usize; 3]> {
     let joints = &branch.joints[..branch.joints.len().min(BRANCHES)];
     let drop = |from: usize, to: usize| -tree.span(from, to).z;
@@ -264,10 +272,10 @@ fn leg_joints(tree: &Tree, branch: &Branch) -> Option<[usize; 3]> {
     best.map(|(_, chain)| chain)
 }
 
-/// Whether names say that the first branch is the left one; they know better than the shape.
+/// Whether names say that the first branch is the left one. Names know better than the shape.
 fn named_first(labels: &[Label], pair: &[Branch; 2]) -> Option<bool> {
     let side = |branch: &Branch| {
-        // A bare letter is no side.
+        // A name that is only a letter says nothing about a side.
         let named = branch
             .joints
             .iter()
@@ -279,7 +287,8 @@ fn named_first(labels: &[Label], pair: &[Branch; 2]) -> Option<bool> {
     (first != second).then_some(first > second)
 }
 
-/// Unit vector to the figure's left, from where its feet point; a figure whose feet don't tell faces +X.
+/// Unit vector to the figure's left, by where its feet point. If they reach less far forward than 0.06 of the leg (chosen, far
+/// below the length of a foot), they don't tell, and the figure is taken to face +X.
 fn facing(tree: &Tree, feet: [(usize, &Branch); 2]) -> Vector3<f64> {
     let toes = |(ankle, branch): (usize, &Branch)| end(tree, branch) - tree.at[ankle].coords;
     let mut forward = toes(feet[0]) + toes(feet[1]);
@@ -290,7 +299,7 @@ fn facing(tree: &Tree, feet: [(usize, &Branch); 2]) -> Vector3<f64> {
     Vector3::z().cross(&forward).normalize()
 }
 
-/// The longest mirrored pair outside of the legs: clavicle, upper arm, lower arm, hand of both sides.
+/// The longest mirrored pair outside the legs: clavicle, upper arm, lower arm and hand, of the left and then of the right.
 fn arms(
     tree: &Tree,
     labels: &[Label],
@@ -313,6 +322,7 @@ fn arms(
             .iter()
             .any(|leg| j == *leg || tree.is_above(*leg, j) || tree.is_above(j, *leg))
     };
+    // Arms are apart in the direction in which legs are, within 45° (its cosine is 0.7).
     let across = |pair: &[Branch; 2]| {
         let apart = end(tree, &pair[0]) - end(tree, &pair[1]);
         apart.dot(&side).abs() > 0.7 * apart.norm() * side.norm()
@@ -321,7 +331,7 @@ fn arms(
         .into_iter()
         .filter(|pair| pair.iter().all(|b| !in_leg(b.joints[0])) && across(pair))
         .max_by(|a, b| a[0].length.total_cmp(&b[0].length))?;
-    // A clavicle begins nearer to the middle than a leg does; what begins farther out is an upper arm.
+    // A clavicle begins nearer to the middle than a leg does. What begins farther out is an upper arm.
     let apart = |a: usize, b: usize| tree.span(a, b).norm();
     let inside = apart(best[0].joints[0], best[1].joints[0]) < apart(left, right);
     let [a, b] = [0, 1].map(|i| arm_joints(tree, &best[i], inside));
@@ -330,8 +340,8 @@ fn arms(
     Some(if leads { [a, b] } else { [b, a] })
 }
 
-/// Clavicle, upper arm, lower arm and hand of a branch, which ends where the fingers begin, and which may begin with a
-/// clavicle where it starts `inside`.
+/// Clavicle, upper arm, lower arm and hand of a branch. The hand is where the fingers branch off. A branch that starts
+/// `inside` may begin with a clavicle: a bone shorter than 0.7 of the next one. Chosen.
 fn arm_joints(tree: &Tree, branch: &Branch, inside: bool) -> [Option<usize>; 4] {
     let joints = &branch.joints;
     let fingers = joints
@@ -352,7 +362,7 @@ fn arm_joints(tree: &Tree, branch: &Branch, inside: bool) -> [Option<usize>; 4] 
     }
 }
 
-/// Refuses a figure whose trunk doesn't continue its legs and whose arms stand as legs do.
+/// Refuses a figure whose trunk doesn't continue its legs, and whose arms point down as its legs do.
 pub(super) fn refuse_quadruped(tree: &Tree, found: &HumanoidMap) -> Result<(), Error> {
     let span = |from: Slot, to: Slot| match (found.joint(from), found.joint(to)) {
         (Some(a), Some(b)) => tree.span(a, b),
@@ -372,6 +382,8 @@ pub(super) fn refuse_quadruped(tree: &Tree, found: &HumanoidMap) -> Result<(), E
     };
     let arms = arm(Slot::LeftUpperArm, Slot::LeftLowerArm, Slot::LeftHand)
         + arm(Slot::RightUpperArm, Slot::RightLowerArm, Slot::RightHand);
+    // Upright, the trunk is at 180° to the legs, on all fours at 90°. 125° and 1 rad are chosen between people who bend
+    // forward at rest and animals on their toes.
     let degrees = trunk.angle(&legs).to_degrees();
     if degrees < 125.0 && arms.angle(&legs) < 1.0 {
         return Err(Error::Quadruped { degrees });

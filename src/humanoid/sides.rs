@@ -1,4 +1,4 @@
-//! Which joint of the left belongs to which of the right.
+//! Which left joint belongs to which right joint.
 
 use super::{HumanoidMap, Slot};
 use crate::clip::Joint;
@@ -16,8 +16,8 @@ const WORDS: [(&str, &str); 8] = [
     ("lt", "rt"),
 ];
 
-/// Pairs of left and right joints: those that stand in slots of both sides, and those outside the map, such as fingers,
-/// whose names, or what the file calls their bones, are the same but for the side.
+/// Pairs of indices (left, right) into `joints`: the joints in opposite slots of `map`, and joints outside the map, such as
+/// fingers, whose names (or the bones that the file calls them) differ only in the side.
 pub fn pairs(joints: &[Joint], map: &HumanoidMap) -> Vec<(usize, usize)> {
     let mut pairs: Vec<(usize, usize)> = Slot::ALL
         .into_iter()
@@ -78,7 +78,7 @@ fn unique<'a>(
     names
 }
 
-/// What a left joint's partner may be called.
+/// What the right partner of a left joint may be called.
 fn mirrored_names(name: &str) -> Vec<String> {
     let words = WORDS.iter().filter(|(left, _)| name.contains(left));
     let words = words.map(|(left, right)| name.replacen(left, right, 1));
@@ -93,7 +93,7 @@ fn mirrored_names(name: &str) -> Vec<String> {
     words.chain(letters).collect()
 }
 
-/// Whether the letter at byte `at` is a word of its own: `hand.l`, `lThumb1`, `J_Bip_L_Index`, `HandL`.
+/// Whether the letter at byte `at` is a word of its own, as in `hand.l`, `lThumb1`, `J_Bip_L_Index` and `HandL`.
 fn stands_alone(name: &str, at: usize) -> bool {
     let letter = name[at..].chars().next().unwrap_or_default();
     let before = name[..at].chars().next_back();

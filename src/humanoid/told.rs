@@ -1,4 +1,4 @@
-//! Slots of joints that the file itself calls bones of a humanoid, as VRM files do.
+//! Slots of joints that the file itself calls bones of a humanoid, as VRM files do. The names of bones are VRM's.
 
 use super::shape::{LEFT_ARM, LEFT_LEG, RIGHT_ARM, RIGHT_LEG};
 use super::tree::Tree;
@@ -8,7 +8,7 @@ use crate::clip::Joint;
 const REASON: &str = "the file says so";
 /// VRM's bones of the trunk, upward. Each but the first may be missing.
 const TRUNK: [&str; 3] = ["spine", "chest", "upperChest"];
-/// Slots whose joints stand below each other, in order.
+/// Slots whose joints are below each other, in order.
 const CHAINS: [&[Slot]; 5] = [
     &[Slot::Chest, Slot::Neck, Slot::Head],
     &LEFT_ARM,
@@ -17,7 +17,7 @@ const CHAINS: [&[Slot]; 5] = [
     &RIGHT_LEG,
 ];
 
-/// The slots that the file tells, none in most files.
+/// The slots that the file states: none in most files.
 pub(super) fn find(joints: &[Joint]) -> HumanoidMap {
     let of = |bone: &str| joints.iter().position(|j| j.bone.as_deref() == Some(bone));
     let mut found = HumanoidMap::default();
@@ -26,7 +26,7 @@ pub(super) fn find(joints: &[Joint]) -> HumanoidMap {
     for (slot, joint) in limbs.filter_map(|slot| Some((slot, of(&bone(slot))?))) {
         put(slot, joint);
     }
-    // Neck and shoulders spring from the uppermost that there is.
+    // The chest is the uppermost bone of the trunk that there is: neck and shoulders branch off there.
     let trunk: Vec<usize> = TRUNK.into_iter().filter_map(of).collect();
     if let Some((&chest, below)) = trunk.split_last() {
         put(Slot::Chest, chest);
@@ -51,12 +51,12 @@ fn bone(slot: Slot) -> String {
     })
 }
 
-/// Fills slots that the file left out with `guesses`, as far as they fit to what it tells.
+/// Fills slots that the file leaves out with `guesses`, where they don't contradict what it states.
 pub(super) fn supplement(tree: &Tree, found: &mut HumanoidMap, guesses: HumanoidMap) {
     let told = found.clone();
     for (slot, guess) in guesses.matches {
         let is_free = told.matches.values().all(|m| m.joint != guess.joint);
-        // The trunk is told as a whole.
+        // The file states the trunk as a whole: a bone that it leaves out isn't there.
         let is_open = told.joint(slot).is_none() && !is_trunk(slot);
         if is_free && is_open && fits(tree, &told, slot, guess.joint) {
             found.matches.insert(slot, guess);
@@ -64,7 +64,7 @@ pub(super) fn supplement(tree: &Tree, found: &mut HumanoidMap, guesses: Humanoid
     }
 }
 
-/// Whether a joint stands between those that the file tells before and after it in its chain.
+/// Whether a joint is between those that the file states before and after it in its chain.
 fn fits(tree: &Tree, told: &HumanoidMap, slot: Slot, joint: usize) -> bool {
     let chains = CHAINS.iter().filter_map(|chain| {
         let at = chain.iter().position(|s| *s == slot)?;

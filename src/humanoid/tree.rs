@@ -3,10 +3,13 @@
 use crate::clip::Joint;
 use nalgebra::{Isometry3, Point3, Vector3};
 
+/// A joint tree for searches up and down.
 pub(super) struct Tree {
+    /// Parent of every joint.
     pub parent: Vec<Option<usize>>,
+    /// Children of every joint, in order.
     pub children: Vec<Vec<usize>>,
-    /// World positions in the rest pose.
+    /// Positions of the joints at rest: world, metres.
     pub at: Vec<Point3<f64>>,
 }
 
@@ -16,7 +19,7 @@ impl Tree {
         let mut children = vec![Vec::new(); joints.len()];
         let mut parent = Vec::with_capacity(joints.len());
         for (j, joint) in joints.iter().enumerate() {
-            // Parents stand before their children; a link that breaks this is no link.
+            // Parents come before their children. Joints made by hand may break this: such a link is ignored.
             let up = joint.parent.filter(|p| *p < j);
             let base = up.map_or_else(Isometry3::identity, |p| world[p]);
             if let Some(p) = up {
@@ -43,7 +46,7 @@ impl Tree {
         above != below && self.upward(below).any(|j| j == above)
     }
 
-    /// Lowest joint that is above, or is, both.
+    /// The lowest joint that is above both, or one of them; `None` in separate trees.
     pub fn meet(&self, a: usize, b: usize) -> Option<usize> {
         let (mut a, mut b) = (a, b);
         // Parents have lower indices, so the higher of the two can't be above the other.
@@ -67,6 +70,7 @@ impl Tree {
         path
     }
 
+    /// From one joint to another at rest: world axes, metres.
     pub fn span(&self, from: usize, to: usize) -> Vector3<f64> {
         self.at[to] - self.at[from]
     }

@@ -1,5 +1,6 @@
 //! Which way is up in a file, and how its axes become Z up, X forward, Y left.
 
+use crate::explain::{Explain, Explanation, Parameter, explained};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 use std::str::FromStr;
@@ -7,18 +8,34 @@ use std::str::FromStr;
 /// The direction in a file's coordinates that points away from the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UpAxis {
+    /// +X points up.
     PlusX,
+    /// −X points up.
     MinusX,
+    /// +Y points up.
     PlusY,
+    /// −Y points up.
     MinusY,
+    /// +Z points up.
     PlusZ,
+    /// −Z points up.
     MinusZ,
 }
 
-/// The text isn't one of the six axes.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown up axis `{0}`; give x, y or z, with - in front where it points down")]
+/// A text that isn't one of the six axes.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownAxis(String);
+
+explained!(UnknownAxis);
+
+impl Explain for UnknownAxis {
+    fn explain(&self) -> Explanation {
+        Explanation::input(format!("unknown up axis `{}`", self.0)).remedy_by(
+            Parameter::UpAxis,
+            "give x, y or z, with - in front where it points down",
+        )
+    }
+}
 
 impl UpAxis {
     const NAMES: [(UpAxis, &'static str); 6] = [
@@ -30,7 +47,7 @@ impl UpAxis {
         (UpAxis::MinusZ, "-Z"),
     ];
 
-    /// The axis that `direction`, in the file's coordinates, is nearest to.
+    /// The axis nearest to `direction`, in the file's coordinates.
     pub(crate) fn nearest(direction: &Vector3<f64>) -> Self {
         let ends = [
             (Self::PlusX, Self::MinusX),
@@ -44,8 +61,8 @@ impl UpAxis {
 
     /// Rotation from the file's axes to Z up, X forward, Y left, for a file of which only the up axis is known.
     ///
-    /// Characters in Y-up files face +Z, those in Z-up files −Y, as the tools that write them have it. For the
-    /// other axes the turn is the shortest one from these; [`super::facing`] puts the heading right.
+    /// Characters in Y-up files face +Z and those in Z-up files −Y, by the conventions of Maya and 3ds Max. For the other axes
+    /// any heading would do, because `facing` corrects it.
     pub(crate) fn canonical_from_file(self) -> Matrix3<f64> {
         match self {
             UpAxis::PlusX => Matrix3::new(0., 1., 0., 0., 0., 1., 1., 0., 0.),

@@ -1,38 +1,40 @@
-//! The pose that meshes were bound to their joints in, which is the rest pose where a file's nodes stand in another.
+//! The bind pose, in which meshes were bound to their joints. It is the rest pose where a file's nodes are in another pose.
 //!
-//! Exporters often leave the nodes in some frame of an animation. The transforms B of the joints when the mesh was
-//! bound keep the pose that the character was modelled in: a joint stands in its parent by B⁻¹(parent) · B(joint).
+//! Exporters often leave the nodes in some frame of an animation. The transforms B of the joints at the time the mesh was
+//! bound keep the pose that the character was modelled in: the transform of a joint in its parent is
+//! B(parent)⁻¹ · B(joint).
 
 use super::rigid::rotation_of;
 use super::scene::Node;
 use crate::clip::Problem;
 use nalgebra::{Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
-/// Nodes within this angle of their bind pose stand in it, in radians.
+/// A node within this angle of its bind pose is in it, radians (about 1°). Chosen.
 const SAME: f64 = 0.02;
-/// A skin's topmost joint may be posed this far, in radians, from where its bind pose has it. Farther off, the bind
-/// pose is given in axes that aren't known.
+/// A skin's topmost joint may be posed this far from its bind pose, in radians (57°). Farther away, the bind pose is taken to be
+/// in other axes, which nobody knows. Chosen: a change of axes is a quarter turn or more.
 const POSED: f64 = 1.0;
-/// The same for the ratio of sizes.
+/// The same for the ratio of sizes: poses don't scale. Chosen.
 const SCALED: f64 = 1.02;
-/// Joints this near to their bind pose but for its heading, as a part of their distance from each other, stand in it. Its
-/// rotations then tell nothing but that it was kept before the joints' axes were changed.
+/// Joints whose positions are this near to their bind pose, up to its heading and as a fraction of their distances from each
+/// other, are in it. If rotations differ all the same, the joints' axes were changed after binding. Chosen.
 const SAME_PLACE: f64 = 0.02;
 
-/// Transforms of joints when a mesh was bound, by node.
+/// Transforms of joints at the time a mesh was bound, by node.
 pub(crate) type Binds = Vec<(usize, Matrix4<f64>)>;
 
-/// The nodes as they stand in the file, depth first.
+/// The nodes as the file places them, depth first.
 pub(crate) struct Stand<'a> {
+    /// The nodes.
     pub nodes: &'a [Node],
-    /// World matrices.
+    /// Their world matrices, in the file's axes and units.
     pub world: &'a [Matrix4<f64>],
-    /// Up axis where bind transforms are in world space but for their heading, which the node's own replaces; `None`
-    /// where nothing is known of their space.
+    /// The up axis, where bind transforms are in world space except for their heading, which the node's own replaces. `None`
+    /// where nothing is known about their space.
     pub up: Option<Vector3<f64>>,
 }
 
-/// World matrices of all nodes in the bind pose, with a note; none if the nodes stand in it anyway. Of several binds
+/// World matrices of all nodes in the bind pose, with a note; `None` if the nodes are in it already. Of several bind transforms
 /// of a node the first counts.
 pub(crate) fn pose(
     stand: &Stand<'_>,
@@ -61,7 +63,8 @@ fn note() -> Problem {
     )
 }
 
-/// World matrices with the `bound` transforms in their parents; where none is at or above a node, its own.
+/// World matrices of the nodes, composed of the `bound` transforms in their parents. A node without one at or above it keeps
+/// its own, bit for bit.
 fn composed(stand: &Stand<'_>, bound: &[Option<Matrix4<f64>>]) -> Vec<Matrix4<f64>> {
     let mut world: Vec<Matrix4<f64>> = Vec::with_capacity(bound.len());
     let mut changed = vec![false; bound.len()];
@@ -90,7 +93,7 @@ fn ends(nodes: &[Node]) -> Vec<usize> {
     ends
 }
 
-/// Bind transforms of one mesh's joints in their parents. Nodes between the joints stand as they do.
+/// Bind transforms of one mesh's joints in their parents. Nodes between the joints stay as they are.
 fn locals(stand: &Stand<'_>, ends: &[usize], mut binds: Binds) -> Binds {
     binds.retain(|(node, bind)| *node < ends.len() && bind.iter().all(|x| x.is_finite()));
     binds.sort_by_key(|&(node, _)| node);
@@ -101,6 +104,7 @@ fn locals(stand: &Stand<'_>, ends: &[usize], mut binds: Binds) -> Binds {
     let mut above: Binds = Vec::new();
     let mut locals = Vec::new();
     for (node, bind) in binds {
+        // The nearest bound joint above this node: nodes are depth first, so a joint whose subtree has ended is done.
         while above.pop_if(|(joint, _)| ends[*joint] <= node).is_some() {}
         let local = match above.last() {
             Some(joint) => stand.parent_by(joint, node).map(|parent| parent * bind),
@@ -122,7 +126,8 @@ impl Stand<'_> {
         }
     }
 
-    /// Whether the joints have the places of their binds, up to a turn about the up axis (planar Procrustes).
+    /// Whether the joints are where their bind transforms have them, up to a turn about the up axis. The best turn φ has
+    /// tan φ = Σ up·(a × b) / Σ (a·b, horizontal parts), with both sets centred (planar Procrustes).
     fn is_in(&self, binds: &Binds) -> bool {
         let Some(up) = self.up else { return false };
         let place = |m: &Matrix4<f64>| Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)]);
@@ -142,7 +147,7 @@ impl Stand<'_> {
         off.sum::<f64>() <= SAME_PLACE * SAME_PLACE * size.sum::<f64>()
     }
 
-    /// Inverse transform of `node`'s parent, given that the joint above them is bound by its matrix.
+    /// Inverse bind transform of `node`'s parent, given the bind matrix of the joint above it.
     fn parent_by(&self, joint: &(usize, Matrix4<f64>), node: usize) -> Option<Matrix4<f64>> {
         let (joint, bind) = *joint;
         match self.nodes[node].parent? {
@@ -154,8 +159,9 @@ impl Stand<'_> {
         }
     }
 
-    /// Bind transform of a joint with no other above it. Bind matrices are in the mesh's space, which files put at the
-    /// parent or at the scene's origin: whichever agrees better with the node, if one does.
+    /// Bind transform, in its parent, of a joint with no bound joint above it. Bind matrices are in the mesh's space, which is
+    /// at the parent in some files and at the scene's origin in others: the one that agrees better with the node is used, if
+    /// either does.
     fn topmost(&self, node: usize, bind: &Matrix4<f64>) -> Option<Matrix4<f64>> {
         let parent = self.nodes[node].parent.map(|parent| self.world[parent]);
         let parent = parent.unwrap_or_else(Matrix4::identity);
@@ -172,8 +178,8 @@ impl Stand<'_> {
             .map(|(_, local)| local)
     }
 
-    /// `world` turned about the up axis to the heading that `node` stands with, if that is to be kept: the twist of
-    /// the turn between them is undone.
+    /// `world` turned about the up axis to the heading of `node`, where there is an up axis. The rotation between both splits
+    /// into a swing and a twist about the up axis (the part of its quaternion along the axis); the twist is undone.
     fn with_heading(&self, node: usize, world: Matrix4<f64>) -> Matrix4<f64> {
         let untwist = || {
             let (up, from) = (self.up?, rotation_of(&linear(&self.world[node]))?);
@@ -190,7 +196,7 @@ impl Stand<'_> {
     }
 }
 
-/// Places seen from their centre.
+/// Positions relative to their centre.
 fn centred(places: impl ExactSizeIterator<Item = Vector3<f64>>) -> Vec<Vector3<f64>> {
     let count = places.len().max(1) as f64;
     let places: Vec<Vector3<f64>> = places.collect();
@@ -204,7 +210,9 @@ fn linear(matrix: &Matrix4<f64>) -> Matrix3<f64> {
 
 /// How two transforms differ in rotation and size.
 struct Turn {
+    /// Radians.
     angle: f64,
+    /// Size of the first, as a multiple of the second's.
     ratio: f64,
 }
 

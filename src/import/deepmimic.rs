@@ -1,11 +1,13 @@
-//! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one fixed humanoid.
+//! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one humanoid that isn't in the file (Peng et al.,
+//! "DeepMimic", 2018).
 
 use super::scene::{Contents, Node, Scene, Take, composed};
 use crate::clip::{MOST_FPS, Problem, slerp};
 use crate::explain::{Explain, Explanation, explained};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
-/// Numbers in one frame: duration, root position, root rotation, then the joints in the order of [`JOINTS`].
+/// Numbers in one frame: duration in seconds, root position in metres, root rotation, then the joints in the order of
+/// [`JOINTS`].
 const ROW: usize = 44;
 /// Numbers in one frame of the format's quadruped.
 const DOG_ROW: usize = 84;
@@ -24,7 +26,7 @@ struct Definition {
     name: &'static str,
     parent: Option<usize>,
     kind: Kind,
-    /// Place in the parent's frame, metres; Y up, X forward, Z to the right.
+    /// Position in the parent's frame, metres; Y up, X forward, Z to the right.
     offset: [f64; 3],
 }
 
@@ -37,7 +39,7 @@ const fn joint(name: &'static str, parent: usize, kind: Kind, offset: [f64; 3]) 
     }
 }
 
-/// The format's humanoid; the sizes are those of its character file.
+/// The format's humanoid. The sizes are those of its character file, `humanoid3d.txt`.
 const JOINTS: [Definition; 15] = [
     Definition {
         name: "root",
@@ -121,8 +123,9 @@ impl Explain for DeepMimicError {
     }
 }
 
-/// One frame: the root's place and every joint's rotation in its parent.
+/// One frame: the root's position and every joint's rotation in its parent.
 struct Pose {
+    /// Seconds from the first frame.
     time: f64,
     root: Vector3<f64>,
     rotations: Vec<UnitQuaternion<f64>>,
@@ -167,7 +170,7 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimic
         .map(|d| Node::bone(d.name.to_owned(), d.parent));
     Ok(DeepMimicScene {
         contents: Contents {
-            // X forward already: the usual turn would be wrong.
+            // Y up, but X forward: the rotation of other Y-up files would be wrong.
             canonical_from_file: Matrix3::new(1., 0., 0., 0., 0., -1., 0., 1., 0.),
             problems,
             ..Contents::new("deepmimic", nodes.collect(), vec![take])
@@ -176,6 +179,7 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimic
     })
 }
 
+/// Whether the file says that the motion repeats.
 fn loop_word(word: Option<&str>, problems: &mut Vec<Problem>) -> Option<bool> {
     match word {
         Some("wrap") => Some(true),
@@ -196,7 +200,7 @@ fn poses(rows: &[Vec<f64>]) -> Result<Vec<Pose>, DeepMimicError> {
     let mut time = 0.0;
     for (frame, row) in rows.iter().enumerate() {
         poses.push(pose(frame, row, time)?);
-        // The last frame's duration leads nowhere: the motion ends at that frame.
+        // The motion ends at the last frame, so that frame's duration doesn't count.
         if frame + 1 < rows.len() {
             if !(row[0] > 0.0 && row[0].is_finite()) {
                 return Err(DeepMimicError::Duration {
@@ -219,6 +223,7 @@ fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
         DOG_ROW => return Err(DeepMimicError::Dog),
         found => return Err(DeepMimicError::Width { frame, found }),
     }
+    // Chosen: whatever is larger is damage, and sums and products of smaller numbers stay finite.
     if !row.iter().all(|x| x.abs() < 1e9) {
         return Err(DeepMimicError::Magnitude { frame });
     }
@@ -251,8 +256,8 @@ fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
     })
 }
 
-/// Frames per second: by the median of the frames' durations, as a whole number where it is within 0.1 % of one
-/// (the files write 1/30 s as 0.033332), and within what can be sampled.
+/// Frames per second, Hz, by the median of the frames' durations: the whole number within 0.1 % of it, if there is one, because
+/// the files write 1/30 s as 0.033332. Within what can be sampled. A single frame has 30, the rate of the format's files.
 fn rate(poses: &[Pose]) -> f64 {
     let mut gaps: Vec<f64> = poses.windows(2).map(|w| w[1].time - w[0].time).collect();
     gaps.sort_by(f64::total_cmp);
@@ -269,7 +274,8 @@ fn rate(poses: &[Pose]) -> f64 {
 }
 
 impl DeepMimicScene {
-    /// Root position and joint rotations at `time`, between the two frames around it.
+    /// Root position and joint rotations at `time` seconds: linear between the two frames around it, and rotations along the
+    /// shortest arc.
     fn pose_at(&self, time: f64) -> (Vector3<f64>, Vec<UnitQuaternion<f64>>) {
         let after = self.poses.partition_point(|pose| pose.time <= time);
         let b = &self.poses[after.min(self.poses.len() - 1)];

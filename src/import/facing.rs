@@ -1,4 +1,4 @@
-//! Which way a character faces, and the turn about Z that makes it face +X.
+//! Which way a character faces at rest, and the turn about Z that makes it face +X.
 
 use crate::clip::Joint;
 use crate::humanoid::{self, HumanoidMap, Slot};
@@ -6,20 +6,19 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// A heading this near to a quarter turn is meant to be one: rest poses stand a few degrees askew, and those taken from
-/// a stride turn the hips more.
+/// A heading this near to a quarter turn is meant to be one, radians. Chosen: rest poses are a few degrees askew, and in those
+/// taken from a stride the hips turn more.
 const SNAP: f64 = 15.0 * PI / 180.0;
 
 /// Left and right places of paired joints (hips, shoulders), in canonical axes.
 pub(crate) type Pair = (Vector3<f64>, Vector3<f64>);
 
-/// Figures with more joints than this are no humanoids, and looking for one among them takes long.
+/// No humanoid is looked for among more joints than this. Chosen: the search would take long, and no rig of one has as many.
 const MOST_JOINTS: usize = 4096;
 
-/// Places at rest of a humanoid's hips and shoulders, or, in other figures, of the joints that a rig names alike but
-/// for their side.
+/// Positions at rest of a humanoid's hips and shoulders; in other figures, of all joints whose names differ only in the side.
 ///
-/// `joints` and `world` (their world transforms) run in parallel.
+/// `world` has the world transform of every joint in `joints`.
 pub(crate) fn pairs(joints: &[Joint], world: &[Isometry3<f64>]) -> Vec<Pair> {
     if joints.len() <= MOST_JOINTS
         && let Ok(map) = humanoid::map(joints)
@@ -57,7 +56,7 @@ fn named_pairs(joints: &[Joint], world: &[Isometry3<f64>]) -> Vec<Pair> {
         .collect()
 }
 
-/// A name in lower case with its side, a word or a letter standing alone, put as `*`; `None` where it has no such side.
+/// A name in lower case with `*` in place of its side, which is a word within it or a letter on its own; `None` without one.
 fn sideless(name: &str, word: &str, letter: &str) -> Option<String> {
     let name = name.to_lowercase();
     if name.contains(word) {
@@ -80,10 +79,11 @@ fn sideless(name: &str, word: &str, letter: &str) -> Option<String> {
     found.then(|| parts.join("_"))
 }
 
-/// Angle about +Z, in (−π, π], that turns a character with these pairs to face +X; nought where it does so already
-/// within [`SNAP`], and `None` where the pairs don't tell.
+/// Angle about +Z, in (−π, π] radians, that turns a character with these pairs to face +X: a quarter turn or none where the
+/// angle is within [`SNAP`] of one, and `None` where the pairs don't tell.
 ///
-/// Forward is left-from-right × up, with left +Y, up +Z and so forward +X.
+/// Forward is (left − right) × up: with left along +Y and up along +Z it is +X. Pairs tell if they are less than 60° from
+/// the horizontal on the whole (its cosine is 0.5). Chosen.
 pub(crate) fn turn_to_forward(pairs: &[Pair]) -> Option<f64> {
     let across: Vector3<f64> = pairs.iter().map(|(left, right)| left - right).sum();
     let forward = across.cross(&Vector3::z());
@@ -98,7 +98,7 @@ pub(crate) fn turn_to_forward(pairs: &[Pair]) -> Option<f64> {
     tells.then_some(if turn <= -PI { PI } else { turn })
 }
 
-/// Rotation about +Z, exact for quarter turns.
+/// Rotation about +Z by `turn` radians, exact for quarter turns: sin and cos of multiples of π/2 have rounding errors.
 pub(crate) fn about_z(turn: f64) -> Matrix3<f64> {
     let quarters = turn / FRAC_PI_2;
     let (sin, cos) = match quarters.round() as i64 {

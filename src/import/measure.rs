@@ -1,12 +1,14 @@
-//! What formats without units or exact rates leave to be found out.
+//! Guesses for formats that state no unit of length, or round their frame rate.
 
 use crate::clip::Problem;
 use nalgebra::Vector3;
 
-/// Frames per second of a frame time as it is written, `None` where it is no time that frames can have.
+/// Frames per second of a frame time, `seconds`, that is written as `text`. `None` outside 1 to 10,000 Hz.
 ///
-/// A decimal fraction stands for the whole rate of which it is the rounded or cut frame time, if it says at least 4 % of
-/// itself: 0.0333 and 0.033 are 30 Hz, 0.03336667 is 29.97, and 0.03 may be anything and is taken as it is.
+/// Writers round or cut frame times: 0.0333 and 0.033 mean 30 Hz. So a frame time stands for a whole rate if that rate's
+/// exact frame time, rounded or cut to the digits written, gives the same text. The exact time may thus be half a last digit
+/// below (rounded up) to one above (cut); the millionths make up for rounding in the division. The last digit must be
+/// worth at most 4 % of the frame time (chosen): 0.03 could mean any of 29 to 40 Hz, and is used as it is.
 pub(crate) fn rate_of_frame_time(text: &str, seconds: f64) -> Option<f64> {
     let rate = 1.0 / seconds;
     if !(1.0..=10_000.0).contains(&rate) {
@@ -15,23 +17,26 @@ pub(crate) fn rate_of_frame_time(text: &str, seconds: f64) -> Option<f64> {
     let digits = text.split(['e', 'E']).next()?;
     let digits = digits.split(['.', ',']).nth(1).map_or(0, str::len);
     let unit = 10f64.powi(-(digits.min(300) as i32));
+    // How far the whole rate's exact frame time is above the written one, in units of the last digit.
     let beyond = (1.0 / rate.round() - seconds) / unit;
     let means_whole = unit <= 0.04 * seconds && (-0.500001..=1.000001).contains(&beyond);
     Some(if means_whole { rate.round() } else { rate })
 }
 
-/// Metres per unit of a file that doesn't say.
+/// The unit of a file that doesn't state one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
+    /// Metres per unit.
     pub unit_m: f64,
+    /// What the unit is called, in the plural.
     name: &'static str,
     /// Longest side of the box around the rest pose, in units.
     size: f64,
 }
 
 impl Scale {
-    /// Units that files are written in. MakeHuman's is the decimetre; the last is that of the CMU motion capture
-    /// database, inches divided by 0.45.
+    /// Units that files are written in, in metres. MakeHuman's is the decimetre. The last one is that of the CMU motion capture
+    /// database, whose skeletons state a length of 0.45 units per inch.
     const UNITS: [(f64, &'static str); 6] = [
         (1.0, "metres"),
         (0.1, "decimetres"),
@@ -40,10 +45,11 @@ impl Scale {
         (0.001, "millimetres"),
         (0.0254 / 0.45, "CMU units of 5.64 cm"),
     ];
-    /// Height of a person's rest pose from toes to the top joint, metres: files end at the head joint or its end site.
+    /// Height of a person's rest pose from the toes to the top joint, metres. Chosen: the mean of adults is about 1.70 m, and
+    /// the top joint is the head joint in some files and its end site in others.
     const PERSON_M: f64 = 1.65;
 
-    /// The unit in which the rest pose is nearest to a person's size.
+    /// The unit in which the longest side of the box around the joints at rest is nearest to a person's height, as a ratio.
     pub fn guess(rest: &[Vector3<f64>]) -> Self {
         let side = |axis: usize| {
             let along = rest.iter().map(|place| place[axis]);
@@ -59,12 +65,14 @@ impl Scale {
         Self { unit_m, name, size }
     }
 
-    /// Whether a person's size, or that of a child or giant, comes of `unit_m`.
+    /// Whether `unit_m` makes the figure half to twice as tall as a person: a child or a giant. Chosen: most
+    /// wrong units are off by more.
     fn allows(&self, unit_m: f64) -> bool {
         let tall = self.size * unit_m / Self::PERSON_M;
         self.size == 0.0 || (0.5..=2.0).contains(&tall)
     }
 
+    /// A note about the guess.
     pub fn problem(&self) -> Option<Problem> {
         Some(Problem::note(
             "unit-guessed",
@@ -77,7 +85,7 @@ impl Scale {
     }
 }
 
-/// Metres per unit of a file that says `stated`, and what is to be told: some files state a unit that isn't theirs.
+/// Metres per unit of a file that may state it, and a note if it had to be guessed: some files state a wrong unit.
 pub(crate) fn unit(stated: Option<f64>, rest: &[Vector3<f64>]) -> (f64, Option<Problem>) {
     let scale = Scale::guess(rest);
     match stated {

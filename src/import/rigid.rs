@@ -9,19 +9,20 @@ pub(crate) struct Frame {
     pub axes: Matrix3<f64>,
     /// Metres per unit of the file.
     pub unit_m: f64,
-    /// Somebody said which way is up, and the figure has no say in it.
+    /// The caller said which way is up, so the figure doesn't decide it.
     pub is_sure: bool,
 }
 
-/// Places beyond this are damage, not motion, and single precision can't hold them: metres.
+/// Positions beyond this are damage, not motion, metres. Chosen: clip files have single precision, and this is far enough from
+/// its limit that later arithmetic stays finite.
 const FARTHEST_M: f64 = 1e12;
 
 impl Frame {
-    /// The rigid transform at the place of `world`, with the rotation nearest to its own; a matrix that has none
-    /// (scaled to nothing) takes `otherwise`.
+    /// The rigid transform, in canonical space, at the position of the file's `world`, with the rotation nearest to its own.
+    /// A matrix that has none, because it is scaled to nothing, gets `otherwise`. `None` if the position can't be used.
     ///
-    /// The file's rotations are conjugated, not only turned, so that joints aligned with the file's axes are
-    /// aligned with the canonical axes, and reflecting axes leave rotations.
+    /// Rotations are conjugated (A R Aᵀ) and not only multiplied by the axes A: so joints aligned with the file's axes become
+    /// aligned with the canonical ones, and axes that reflect still make rotations.
     pub fn rigid(
         &self,
         world: &Matrix4<f64>,
@@ -44,16 +45,17 @@ impl Frame {
     }
 }
 
-/// The rotation nearest to a linear map, or `None` where it flattens space.
+/// The rotation nearest to a linear map, or `None` where the map flattens space (to a billionth, chosen: beyond that the axis is
+/// noise).
 ///
-/// A mirroring map is reflected through its own origin first. Any reflection would make it a rotation; this one
-/// needs no choice of an axis, so the result can't jump from one frame to the next.
+/// A map that mirrors is reflected through the origin first. Any reflection would make it a rotation, but this one needs no
+/// choice of an axis, so the result can't jump from one frame to the next.
 pub(crate) fn rotation_of(linear: &Matrix3<f64>) -> Option<Rotation3<f64>> {
     let lengths: Vector3<f64> = Vector3::from_fn(|c, _| linear.column(c).norm());
     if !(lengths.min() > 1e-9 * lengths.max() && lengths.max().is_finite()) {
         return None;
     }
-    // Unit columns: what scale along the joint's own axes leaves is the rotation already.
+    // With columns of unit length, a scale along the joint's own axes is gone and the matrix is a rotation already.
     let mut unit = Matrix3::from_fn(|r, c| linear[(r, c)] / lengths[c]);
     let volume = unit.determinant();
     if volume.abs() < 1e-9 {
@@ -65,7 +67,8 @@ pub(crate) fn rotation_of(linear: &Matrix3<f64>) -> Option<Rotation3<f64>> {
     Some(Rotation3::from_matrix_unchecked(nearest_orthogonal(unit)?))
 }
 
-/// Orthogonal polar factor by Newton's iteration (Higham 1986): X ← (X + X⁻ᵀ) / 2.
+/// Orthogonal polar factor by Newton's iteration, X ← (X + X⁻ᵀ) / 2 (Higham, "Computing the polar decomposition with
+/// applications", 1986). It converges quadratically; sixty steps are chosen far above what nearly flat matrices need.
 fn nearest_orthogonal(mut x: Matrix3<f64>) -> Option<Matrix3<f64>> {
     for _ in 0..60 {
         let next = (x + x.try_inverse()?.transpose()) * 0.5;
@@ -78,7 +81,7 @@ fn nearest_orthogonal(mut x: Matrix3<f64>) -> Option<Matrix3<f64>> {
     Some(x)
 }
 
-/// Local transforms, parent from joint, of joints whose world transforms are given, parents first.
+/// Local transforms, parent from joint, of joints with these world transforms, parents first.
 pub(crate) fn locals(parents: &[Option<usize>], world: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
     let local = |(parent, world_from_joint): (&Option<usize>, &Isometry3<f64>)| match parent {
         Some(p) => world[*p].inv_mul(world_from_joint),

@@ -1,4 +1,4 @@
-//! What a reader gives to the importer: a tree of nodes, its takes, and where every node is at any time.
+//! What a format's reader gives to the importer: a tree of nodes, takes, and where every node is at any time.
 
 use super::axes::UpAxis;
 use super::error::NoTakes;
@@ -6,21 +6,23 @@ use crate::clip::Problem;
 use crate::explain::Explanation;
 use nalgebra::{Matrix3, Matrix4};
 
-/// One node of the file's tree. Parents stand before their children.
+/// One node of the file's tree. Parents come before their children.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
+    /// Its name in the file.
     pub name: String,
+    /// Index of the parent; `None` for a root.
     pub parent: Option<usize>,
-    /// The file says that this node is a bone (FBX limb or skeleton root, glTF skin joint).
+    /// Whether the file says that this node is a bone (FBX limb or skeleton root, glTF skin joint).
     pub is_bone: bool,
-    /// The file holds nothing but transforms in it (no mesh, camera or light).
+    /// Whether it holds nothing but a transform: no mesh, camera or light.
     pub is_plain: bool,
-    /// The bone of a humanoid that the file says this is, as in [`Joint::bone`](crate::clip::Joint::bone).
+    /// The bone of a humanoid that the file says this is; see [`Joint::bone`](crate::clip::Joint::bone).
     pub bone: Option<String>,
 }
 
 impl Node {
-    /// A bone of a format that has nothing else.
+    /// A node of a format in which every node is a bone.
     pub fn bone(name: String, parent: Option<usize>) -> Self {
         Self {
             name,
@@ -35,27 +37,28 @@ impl Node {
 /// One animation of the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Take {
+    /// Its name in the file; of a format without names, the file's.
     pub name: String,
-    /// Seconds.
+    /// Start of the take, seconds of the file's clock.
     pub start: f64,
-    /// Seconds; not before `start`.
+    /// End of the take, seconds of the file's clock; not before `start`.
     pub end: f64,
-    /// Frame rate that the file states or its keys keep, in Hz, from 1 to 10,000.
+    /// Frame rate that the file states or its keys keep, Hz, from 1 to 10,000.
     pub fps: f64,
-    /// Nodes that this take moves.
+    /// Indices of the nodes that this take moves.
     pub animated: Vec<usize>,
     /// `Some` where the format itself says whether the take loops.
     pub wraps: Option<bool>,
-    /// Curves, or groups of them, that are looked at to place the nodes once.
+    /// How many curves, or groups of curves, are evaluated to place the nodes once.
     pub channels: usize,
-    /// What the reader found wrong, or left out, in this take.
+    /// What the reader found wrong in this take, or left out.
     pub problems: Vec<Problem>,
-    /// Why this take can't be used, and what to do.
+    /// Why this take can't be used, and what to do; its place names the take.
     pub fault: Option<Box<Explanation>>,
 }
 
 impl Take {
-    /// A take without length that moves nothing.
+    /// A take without length that moves nothing, to be filled in.
     pub fn still(name: String) -> Self {
         Self {
             name,
@@ -71,14 +74,16 @@ impl Take {
     }
 }
 
-/// What a file holds, but for its motion. Nothing in it can be out of range any more.
+/// What a file holds, except for its motion. Its reader has checked that everything is in range.
 #[derive(Debug)]
 pub(crate) struct Contents {
     /// `fbx`, `gltf`, `bvh`, `asf`, `amc` or `deepmimic`.
     pub format: &'static str,
+    /// The nodes, parents first.
     pub nodes: Vec<Node>,
+    /// The takes, in the file's order.
     pub takes: Vec<Take>,
-    /// What the file lacks if it has no takes, and what to do.
+    /// What the file holds instead of takes, and what to do, if it has none.
     pub no_takes: NoTakes,
     /// Up axis of the file's coordinates, e.g. `+Y`.
     pub up_axis: String,
@@ -86,9 +91,9 @@ pub(crate) struct Contents {
     pub unit_m: f64,
     /// Rotation (or, for left-handed data, reflection) from the file's axes to Z up, X forward, Y left.
     pub canonical_from_file: Matrix3<f64>,
-    /// World matrices at rest, where that isn't how the nodes stand.
+    /// World matrices of the nodes at rest, where the file's nodes are in another pose.
     pub bound: Option<Vec<Matrix4<f64>>>,
-    /// What the reader found wrong, or left out, in the file, whichever take is used.
+    /// What the reader found wrong in the file, or left out, whichever take is used.
     pub problems: Vec<Problem>,
     /// Bytes that were read from other files.
     pub bytes_beside: usize,
@@ -118,11 +123,13 @@ impl Contents {
 
 /// An animation file after parsing.
 pub(crate) trait Scene {
+    /// What it holds, except for its motion.
     fn contents(&self) -> &Contents;
-    /// World matrices of all nodes, in the file's axes and units: at `time` seconds of `take`, or as they stand.
+    /// World matrices of all nodes in the file's axes and units, at a take and seconds of the file's clock. Without `at`, as
+    /// the file's nodes are placed.
     fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>>;
 
-    /// The same, at rest where there is no `at`.
+    /// The same; without `at`, in the rest pose.
     fn world(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
         match (at, &self.contents().bound) {
             (None, Some(bound)) => bound.clone(),
@@ -130,16 +137,18 @@ pub(crate) trait Scene {
         }
     }
 
+    /// The nodes, parents first.
     fn nodes(&self) -> &[Node] {
         &self.contents().nodes
     }
 
+    /// The takes, in the file's order.
     fn takes(&self) -> &[Take] {
         &self.contents().takes
     }
 }
 
-/// World matrices of nodes from those in their parents.
+/// World matrices of the nodes from their matrices in their parents.
 pub(crate) fn composed(
     nodes: &[Node],
     locals: impl Iterator<Item = Matrix4<f64>>,

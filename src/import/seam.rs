@@ -1,33 +1,34 @@
-//! Whether a clip's end joins its beginning.
+//! Whether a clip repeats: whether its end joins its beginning. All thresholds here are chosen.
 
 use crate::clip::carry;
 use nalgebra::{Isometry3, Vector3};
 
-/// Largest joint distance across the seam, relative to the skeleton's height: root mean square, and any joint.
+/// Largest distance of joints across the seam, relative to the figure's size: root mean square, and of any one joint.
 const SEAM_RMS: f64 = 0.02;
 const SEAM_MAX: f64 = 0.04;
-/// The seam may be this part of how far the pose changes in the clip. A clip that hardly moves would pass the
-/// limits above whatever it does.
+/// Largest distance across the seam as a fraction of how far the pose changes in the clip: a clip that hardly moves would pass
+/// the limits above whatever it does.
 const SEAM_OF_RANGE: f64 = 0.2;
-/// Pose change, relative to height, below which a clip stands still and has nothing to repeat.
+/// Change of pose, relative to the figure's size, below which a clip stands still and has nothing to repeat.
 const STILL: f64 = 0.002;
-/// Velocity across the seam may jump by so many times the median jump between frames within the clip, …
+/// Velocity across the seam may jump by this many times the median jump between frames within the clip, …
 const JUMP_OF_MEDIAN: f64 = 4.0;
-/// … or this part of the largest one, …
+/// … or this fraction of the largest one, …
 const JUMP_OF_LARGEST: f64 = 0.5;
-/// … or this part of the clip's root mean square speed.
+/// … or this fraction of the clip's root mean square speed.
 const JUMP_OF_SPEED: f64 = 0.25;
 /// Fewest frames in which a cycle can be seen.
 const FEWEST: usize = 5;
 
+/// Positions of joints, metres.
 pub(super) type Places = Vec<Vector3<f64>>;
 
-/// Whether the clip with these world transforms wraps: its last frame is its first, moved over the ground.
+/// Whether the clip with these world transforms repeats: its last frame is its first, moved over the ground.
 ///
-/// Moving over the ground is a turn about Z and a horizontal shift, fitted to all joints; it stands for the root's
-/// heading frame without having to know which joint is the root (files put the travel on different ones). What
-/// is left must be small beside the skeleton and beside the motion itself, and velocities must run on across the
-/// seam: a pose that is passed twice in different directions doesn't close a cycle.
+/// The move over the ground, a turn about Z and a horizontal shift, is fitted to all joints. So nobody needs to know which
+/// joint is the root: files put the travel on different ones. The remaining distance must be small compared with the figure
+/// and with the motion, and velocities must continue across the seam, because a pose that is passed twice in different
+/// directions doesn't close a cycle.
 pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
     let frames = moving_places(world);
     let [first, second, .., before, last] = frames.as_slice() else {
@@ -50,6 +51,7 @@ pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
     if rms(&gaps) > SEAM_RMS * height || widest > SEAM_MAX * height {
         return false;
     }
+    // The first step of the next cycle, in the heading in which the last one ends.
     let onward: Places = difference(first, second)
         .iter()
         .map(|v| onto_last * v)
@@ -80,7 +82,8 @@ fn runs_on(frames: &[Places], jump: &[Vector3<f64>]) -> bool {
     limits.iter().any(|limit| rms(jump) <= *limit)
 }
 
-/// Places of the joints that move at all: a file's still armature nodes don't travel with the character.
+/// Positions of the joints that move at all, by more than a ten-thousandth of the figure's size: a file's armature nodes stand
+/// still and don't travel with the character.
 pub(super) fn moving_places(world: &[Vec<Isometry3<f64>>]) -> Vec<Places> {
     let Some(first) = world.first() else {
         return Vec::new();
@@ -112,7 +115,7 @@ pub(super) fn extent(frame: &[Isometry3<f64>]) -> f64 {
     (0..3).map(side).fold(0.0, f64::max)
 }
 
-/// Farthest that the pose gets from the first one once travel is taken out.
+/// The largest distance of a pose from the first one, without the travel.
 fn pose_range(frames: &[Places]) -> f64 {
     let Some(first) = frames.first() else {
         return 0.0;
@@ -121,16 +124,18 @@ fn pose_range(frames: &[Places]) -> f64 {
     frames.iter().map(away).fold(0.0, f64::max)
 }
 
-/// How far `a`, carried over the ground, is from `b`.
+/// From `b` to `a` moved over the ground, joint by joint.
 fn gaps(carry: &Isometry3<f64>, a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
     let place = |p: &Vector3<f64>| carry.rotation * p + carry.translation.vector;
     a.iter().zip(b).map(|(a, b)| place(a) - b).collect()
 }
 
+/// From `a` to `b`, joint by joint.
 pub(super) fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Places {
     a.iter().zip(b).map(|(a, b)| b - a).collect()
 }
 
+/// Root mean square length.
 pub(super) fn rms(vectors: &[Vector3<f64>]) -> f64 {
     let square: f64 = vectors.iter().map(Vector3::norm_squared).sum();
     (square / vectors.len().max(1) as f64).sqrt()

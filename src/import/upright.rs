@@ -1,29 +1,30 @@
-//! Which way a figure stands, where a file is wrong about it.
+//! Which way a figure stands, where its file is wrong about it.
 //!
-//! Some files say that Y is up, or say nothing, and hold data whose up is Z. A person stands on both feet in the rest
-//! pose and, on the whole, in the motion: where both agree on an axis that isn't the stated one, it is up.
+//! Some files state that Y is up, or nothing at all, and hold data with Z up. A person stands on both feet in the rest pose
+//! and, on the whole, in the motion. Where both agree on an axis other than the stated one, that axis is up.
 
 use super::axes::UpAxis;
 use crate::clip::{Joint, Problem};
 use crate::humanoid::{self, HumanoidMap, Slot};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-/// An axis counts as the one that a figure stands along if it is this many times longer than the others.
+/// A figure stands along an axis if its extent along it is this many times that across it. Chosen: 63° from the ground.
 const CLEAR: f64 = 2.0;
-/// Figures with more joints than this are no humanoids, and looking for one among them takes long.
+/// No humanoid is looked for among more joints than this. Chosen: the search would take long, and no rig of one has as many.
 const MOST_JOINTS: usize = 4096;
 
 /// Where a humanoid's head and feet are.
 pub(crate) struct Stature(HumanoidMap);
 
 impl Stature {
+    /// That of a humanoid; `None` for other figures.
     pub fn of(joints: &[Joint]) -> Option<Self> {
         (joints.len() <= MOST_JOINTS)
             .then(|| humanoid::map(joints).ok())?
             .map(Self)
     }
 
-    /// From the middle of the feet to the head.
+    /// From the middle of the feet to the head, or to the nearest joint to it that there is.
     fn rise(&self, world: &[Isometry3<f64>]) -> Option<Vector3<f64>> {
         let place = |slot| Some(world.get(self.0.joint(slot)?)?.translation.vector);
         let top = place(Slot::Head)
@@ -33,8 +34,8 @@ impl Stature {
         Some(top? - feet)
     }
 
-    /// The file's up axis in place of the stated one, +Z of the canonical axes, where rest pose and motion agree on
-    /// another. All poses are in canonical axes, in which `axes` put the file's.
+    /// The up axis of the file's data, where rest pose and motion agree on another one than stated. The poses are in canonical
+    /// axes, which have the stated one as +Z; `axes` is canonical from file.
     pub fn other_up(
         &self,
         rest: &[Isometry3<f64>],
@@ -44,13 +45,14 @@ impl Stature {
         let stands = along(&self.rise(rest)?)?;
         let rises = motion.iter().filter_map(|pose| self.rise(pose));
         let moves = along(&rises.sum::<Vector3<f64>>())?;
-        // A reflection has no axes that could be exchanged by a turn.
+        // Left-handed axes can't become right ones by a turn, so nothing is exchanged there.
         let plain = axes.determinant() > 0.0;
         (plain && stands == moves && stands != Vector3::z())
             .then(|| UpAxis::nearest(&(axes.transpose() * stands)))
     }
 }
 
+/// A note about the correction.
 pub(crate) fn problem(stated: &str, up: UpAxis) -> Problem {
     Problem::note(
         "up-axis-corrected",
@@ -60,7 +62,7 @@ pub(crate) fn problem(stated: &str, up: UpAxis) -> Problem {
     )
 }
 
-/// The axis, with its sign, that a vector clearly runs along.
+/// The axis, with its sign, that a vector clearly points along.
 fn along(v: &Vector3<f64>) -> Option<Vector3<f64>> {
     let longest = v.iamax();
     let mut others = *v;

@@ -1,54 +1,60 @@
-//! The best cycle of a long take.
+//! The best cycle of a long take: a part that comes back to where it starts.
+//!
+//! A coarse search compares poses at all pairs of evenly spaced frames and keeps, for every length, the best start. The
+//! lengths that are better than their neighbours are then refined frame by frame.
 
 use super::at_least;
 use super::figure::{Figure, moving};
 use super::look::{Look, landmarks};
 use super::seam::{Seam, Side, carry_all, near};
-use crate::clip::{Clip, Error, LoopMode, Problem, Severity};
+use crate::clip::{Clip, Error, LoopMode, Problem};
 use nalgebra::Isometry3;
 
-/// Pairs of frames that are compared in the first, coarse search.
+/// Most pairs of frames that the coarse search compares. Chosen as a bound on its time.
 const PAIRS: usize = 48_000_000;
-/// Most frames that take part in it.
+/// Most frames that it compares. Chosen as a bound on its memory.
 const MOST_LOOKS: usize = 40_000;
-/// Longest step between them, s, where their number allows it: poses are alike for about as long.
+/// Longest step between these frames, seconds, where their number allows it. Chosen: poses stay alike for about as long.
 const COARSE: f64 = 0.1;
-/// Poses between the ends of a loop that show how far it moves.
+/// About how many poses within a loop are compared with its start to see how far it moves. Chosen.
 const BETWEEN: usize = 64;
-/// Lengths that are looked at more closely.
+/// Most lengths that are refined. Chosen.
 const CANDIDATES: usize = 32;
-/// A shorter cycle is as good as the best if its gap is no wider by more than this part of the motion.
+/// A shorter cycle is as good as the best if its gap is wider by no more than this fraction of the motion. Chosen: several
+/// strides close about as well as one, and one is wanted.
 const TIE: f64 = 0.02;
-/// Pose change, relative to the figure's size, below which nothing happens that could repeat.
+/// Change of pose, relative to the figure's size, below which nothing happens that could repeat. Chosen: 2 mm in a metre.
 const STILL: f64 = 0.002;
-/// Gap, relative to the motion, that is told of.
+/// A gap wider than this fraction of the motion is worth a warning. Chosen.
 const NOTICEABLE: f64 = 0.25;
-/// A cycle that turns less than this goes straight, radians (1°).
+/// A cycle that turns less than this goes straight, radians: 1°. Chosen: repeated, a smaller turn still bends the path into a
+/// circle, where a straight one is meant.
 const STRAIGHT: f64 = 0.0175;
-/// Time on either side of the seam over which its gap is spread, s, and the part of the cycle that this is at most.
+/// Seconds on either side of the seam over which its gap is spread, and the largest fraction of the cycle that this may be.
+/// Chosen: about half a step, so that each foot's contact is bent only once.
 const SPREAD: f64 = 0.25;
 const SHARE: f64 = 0.25;
 
-/// A part of a clip that comes back to where it starts.
+/// A part of a clip that comes back to where it starts, by frames of the clip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loop {
     /// First frame.
     pub start: usize,
     /// Last frame: the first one of the next cycle.
     pub end: usize,
-    /// How much pose and velocity differ between both, as a part of how much they change on the way.
+    /// How much pose and velocity differ between both, as a fraction of how much they change in between.
     pub gap: f64,
 }
 
 impl Clip {
-    /// The part of the clip, `shortest` seconds or longer, whose end is most like its start: in pose and velocity,
-    /// whatever the place on the ground and the heading. Of about equally good ones the shortest is chosen.
+    /// The part of the clip, `shortest` seconds or longer, whose end is most like its start in pose and velocity, wherever it
+    /// is on the ground and whichever way it faces. Of about equally good parts it is the shortest.
     ///
-    /// All lengths are tried in clips up to about a quarter of an hour. In longer ones only those from the shortest to
-    /// some more are, two minutes more in an hour, so that the work doesn't grow with the square of the clip.
+    /// In clips of up to about a quarter of an hour all lengths are tried. In longer ones only the shorter lengths are, up to
+    /// two minutes beyond `shortest` in an hour, so that the work doesn't grow with the square of the clip.
     ///
     /// # Errors
-    /// A clip that is too short, or that stands still.
+    /// An [`Error`] for a clip that is shorter than that or stands still, and for a `shortest` below 0.
     pub fn find_loop(&self, shortest: f64) -> Result<Loop, Error> {
         self.check()?;
         let shortest = at_least("a shortest cycle", shortest, 0.0, "seconds from 0 up")?;
@@ -83,11 +89,11 @@ impl Clip {
         self.closed(&found)
     }
 
-    /// A part of the clip as a loop that runs on without a jump in pose or velocity: what its end and start differ by,
-    /// apart from the way over the ground, is spread over the frames around the seam.
+    /// A part of the clip as a loop without a jump in pose or velocity at its seam. What its end and its start differ by, apart
+    /// from travel over the ground, is spread over the frames around the seam.
     ///
     /// # Errors
-    /// A loop that isn't of this clip.
+    /// An [`Error`] for a loop that isn't a part of this clip.
     pub fn closed(&self, part: &Loop) -> Result<Clip, Error> {
         self.check()?;
         let (start, end) = (part.start, part.end);
@@ -104,11 +110,11 @@ impl Clip {
         let mut frames = self.frames[start..=end].to_vec();
         self.close(&figure, &carry, start, &mut frames);
         let mut clip = self.with_frames(frames, self.fps, LoopMode::Wrap);
-        clip.tell(gap_problem(part));
+        clip.add_problems(gap_problem(part));
         Ok(clip)
     }
 
-    /// Bends both ends of `frames`, which start at `start`, until the last is the first, moved on.
+    /// Bends both ends of `frames`, which begin at frame `start` of the clip, until the last is the first moved by `carry`.
     fn close(
         &self,
         figure: &Figure,
@@ -119,14 +125,16 @@ impl Clip {
         let last = frames.len() - 1;
         let window = (SPREAD * self.fps).min(SHARE * last as f64).round() as usize;
         let window = window.clamp(1, last.div_ceil(2));
-        // Velocities come from frames on both sides, where the take has them.
+        // Velocities are differences of frames on both sides of each end, where the take has such frames.
         let (next, at) = self.around(start);
         let mut next = next.to_vec();
         carry_all(self, figure, carry, &mut next);
         let (poses, end) = self.around(start + last);
         let seam = Seam::between(Side { poses, at: end }, Side { poses: &next, at });
+        // A clip that loops already has the velocities that it should have.
         let loops_already = self.loop_mode == LoopMode::Wrap && frames.len() == self.frames.len();
         let seam = if loops_already { seam.of_poses() } else { seam };
+        // The beginning is bent where the end leads to, so that both halves of the gap are measured in one place.
         seam.bend_end(frames, window);
         let coming = &mut next[at..];
         seam.bend_start(coming, window);
@@ -136,7 +144,7 @@ impl Clip {
         }
     }
 
-    /// The frames around a frame, and where it is among them.
+    /// The frames around a frame, and its index among them.
     fn around(&self, frame: usize) -> (&[Vec<Isometry3<f64>>], usize) {
         let away = near(self);
         let from = frame.saturating_sub(away);
@@ -146,18 +154,19 @@ impl Clip {
 }
 
 fn gap_problem(part: &Loop) -> Option<Problem> {
-    (part.gap > NOTICEABLE).then(|| Problem {
-        id: "cycle-gap".to_owned(),
-        severity: Severity::Warning,
-        message: format!(
-            "even the best cycle doesn't close: pose and velocity at its ends differ by {:.0} % of how far they change; \
-             choose a part of the take that repeats",
-            100.0 * part.gap
-        ),
+    (part.gap > NOTICEABLE).then(|| {
+        Problem::warning(
+            "cycle-gap",
+            format!(
+                "even the best cycle doesn't close: pose and velocity at its ends differ by {:.0} % of how far they change; \
+                 choose a part of the take that repeats",
+                100.0 * part.gap
+            ),
+        )
     })
 }
 
-/// A loop between frames of the coarse search, and how far its pose changes, metres.
+/// A loop between frames of the coarse search, and how far its pose gets from its start, metres.
 struct Candidate {
     found: Loop,
     range: f64,
@@ -165,11 +174,12 @@ struct Candidate {
 
 struct Search<'a> {
     clip: &'a Clip,
+    /// Joints that represent a pose.
     landmarks: Vec<usize>,
-    /// Frames from one look to the next.
+    /// Frames of the clip from one look to the next.
     stride: usize,
     looks: Vec<Look>,
-    /// Change below which nothing happens, metres.
+    /// Change of pose below which nothing happens, metres.
     still: f64,
 }
 
@@ -178,6 +188,7 @@ impl<'a> Search<'a> {
         let figure = Figure::new(&clip.joints, &moving(clip));
         let landmarks = landmarks(clip, &figure);
         let frames = clip.frames.len();
+        // n frames make n² / 2 pairs.
         let all_pairs = frames.div_ceil((2 * PAIRS).isqrt());
         let coarse = (COARSE * clip.fps) as usize;
         let stride = all_pairs
@@ -204,7 +215,7 @@ impl<'a> Search<'a> {
         let longest = (least + PAIRS / self.looks.len().max(1)).min(most);
         let mut best: Vec<Option<Candidate>> = (0..=longest).map(|_| None).collect();
         for start in 0..self.looks.len() {
-            self.from(start, least, &mut best);
+            self.try_start(start, least, &mut best);
         }
         let gap = |length: usize| {
             let found = best.get(length).and_then(Option::as_ref);
@@ -223,8 +234,9 @@ impl<'a> Search<'a> {
         candidates
     }
 
-    /// Takes the loops that start at look `start` into the best of each length.
-    fn from(&self, start: usize, least: usize, best: &mut [Option<Candidate>]) {
+    /// Updates the best loop of each length with those that start at look `start`. The range of the motion grows along the way:
+    /// poses before `least` count for it, too.
+    fn try_start(&self, start: usize, least: usize, best: &mut [Option<Candidate>]) {
         let mut range = 0.0_f64;
         let between = (1..least).step_by((least / BETWEEN).max(1));
         for length in between.chain(least..best.len()) {

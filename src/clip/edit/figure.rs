@@ -1,16 +1,18 @@
-//! Which joints carry a figure over the ground.
+//! Which joints carry a figure over the ground: files put the travel on different ones.
 
 use crate::clip::{Clip, Joint, carry};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-/// A joint whose transform changes less than this, in metres or parts of a quaternion, stands still: files round.
+/// A joint whose transform changes by less than this, in metres or in parts of a quaternion, stands still. Chosen: clip files
+/// have single precision, which rounds a distance of 100 m by 4 µm.
 const STILL: f64 = 1e-5;
 
 /// The moving part of a joint tree.
 pub(super) struct Figure {
-    /// The topmost joints that move: whatever is above stays where it is, and the rest is carried along.
+    /// The topmost joints that move. What is above them stays where it is; what is below is carried along.
     pub carriers: Vec<usize>,
-    /// The joint whose way is the figure's: the first from the largest carrier down in which the tree forks.
+    /// The joint whose path is the figure's, usually the hips: from the carrier with the most joints down, the first at which
+    /// the tree forks.
     pub traveller: usize,
     /// The traveller and all below it.
     pub members: Vec<usize>,
@@ -33,7 +35,7 @@ pub(super) fn moving(clip: &Clip) -> Vec<bool> {
 }
 
 impl Figure {
-    /// `joints` has at least one joint, and says the same number of times whether one moves.
+    /// `joints` has at least one joint; `moving` says of each whether it moves.
     pub fn new(joints: &[Joint], moving: &[bool]) -> Self {
         let carriers = carriers(joints, moving);
         let mut below = vec![1_usize; joints.len()];
@@ -52,15 +54,15 @@ impl Figure {
         }
     }
 
-    /// The move over the ground that brings the pose `from` to the pose `to`, both of world transforms: the traveller's
-    /// place meets its place, and the heading is the one at which all members come nearest.
+    /// The move over the ground that brings the pose `from` to the pose `to` (world transforms): the traveller meets itself,
+    /// and the turn is the one at which all members come nearest.
     pub fn carry(&self, from: &[Isometry3<f64>], to: &[Isometry3<f64>]) -> Isometry3<f64> {
         let turn = carry(&self.places(from), &self.places(to)).rotation;
         self.about_traveller(turn, from, to)
     }
 
-    /// The same, without a turn where that is less than `straight` or than the poses leave unclear: what keeps the
-    /// members apart, as an angle at their distance from the traveller.
+    /// The same without a turn, where the turn is smaller than `straight` radians or than what the poses leave unclear: the
+    /// members' remaining distance from each other, seen as an angle from the traveller.
     pub fn carry_straight(
         &self,
         from: &[Isometry3<f64>],
@@ -98,7 +100,7 @@ impl Figure {
         Isometry3::from_parts(shift.into(), turn)
     }
 
-    /// Each carrier and the transform of its parent in the world, which stands still.
+    /// Each carrier, and the world transform of its parent, which stands still.
     pub fn footings<'a>(
         &'a self,
         clip: &'a Clip,

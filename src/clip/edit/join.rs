@@ -1,23 +1,24 @@
-//! Several clips of one figure, one after another.
+//! Several clips of one figure, played one after another.
 
 use super::at_least;
 use super::figure::{Figure, moving};
 use super::seam::{Seam, Side, near};
-use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem, Severity};
+use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem};
 use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 
-/// Rest poses that differ by more, in metres or radians, are told of.
+/// A joint whose rest transform differs by more than this, in metres or radians, is worth a warning. Chosen.
 const OTHER_REST: f64 = 0.01;
 
 impl Clip {
-    /// The clips one after another, at the rate and with the rest pose of the first. Each begins where the one before
-    /// ends: its last frame and the next one's first are the same instant, on the same place of the ground and with the
-    /// same heading. What poses and velocities differ there is spread over `blend` seconds, half before and half after,
-    /// so that both run on without a jump.
+    /// The clips one after another, at the rate and with the rest pose of the first. Each begins where the one before it ends:
+    /// the last frame of one and the first of the next are the same instant, at the same place on the ground and with the
+    /// same heading. The difference of poses and velocities there is spread over `blend` seconds, half before and half
+    /// after, so that neither jumps.
     ///
     /// # Errors
-    /// Clips whose joints aren't the same by name, or that are too long together; a `blend` below 0.
+    /// An [`Error`] for no clips, for clips whose joints don't have the same names and parents, for more frames than a clip
+    /// may have, and for a `blend` below 0.
     pub fn join(clips: &[Clip], blend: f64) -> Result<Clip, Error> {
         let blend = at_least("a blend", blend, 0.0, "seconds from 0 up")?;
         let (first, others) = clips.split_first().ok_or(Error::NoClips)?;
@@ -40,7 +41,7 @@ impl Clip {
         Ok(joined)
     }
 
-    /// `next` put behind this clip, whose last piece has `piece` frames.
+    /// Appends `next` to this clip, whose last piece has `piece` frames: a blend reaches no farther than the middle of either.
     fn follow(&mut self, mut next: Clip, figure: &Figure, piece: usize, blend: f64) {
         let carry = figure.carry(&next.world(0), &self.world(self.frames.len() - 1));
         let theirs: Vec<(usize, Isometry3<f64>)> = figure.footings(&next).collect();
@@ -62,11 +63,11 @@ impl Clip {
         seam.bend_end(&mut self.frames, window);
         seam.bend_start(&mut coming, window);
         self.frames.extend(coming.into_iter().skip(1));
-        self.tell(next.problems);
+        self.add_problems(next.problems);
     }
 
-    /// Moves `poses` of a clip with the footings `theirs` over the ground, onto this clip's own: what stands still above
-    /// the carriers may stand elsewhere in the other clip.
+    /// Moves `poses` of another clip, with the footings `theirs`, over the ground and onto this clip's own footings: what stands
+    /// still above the carriers may be elsewhere in the other clip.
     fn set_on(
         &self,
         figure: &Figure,
@@ -120,7 +121,7 @@ impl Clip {
     }
 }
 
-/// For each joint the place of its namesake in `theirs`.
+/// For each joint, the index of its namesake in `theirs`.
 fn order(ours: &[Joint], theirs: &[Joint]) -> Result<Vec<usize>, String> {
     let same = |(a, b): (&Joint, &Joint)| a.name == b.name && a.parent == b.parent;
     if ours.len() == theirs.len() && ours.iter().zip(theirs).all(same) {
@@ -159,13 +160,12 @@ fn other_rest(ours: &Clip, theirs: &Clip, order: &[usize]) -> Option<Problem> {
             || a.rotation.angle_to(&b.rotation) > OTHER_REST
     };
     let (joint, _) = ours.joints.iter().zip(order).find(differs)?;
-    Some(Problem {
-        id: "other-rest".to_owned(),
-        severity: Severity::Warning,
-        message: format!(
-            "joint `{}` rests differently in `{}` and `{}`: they may be figures of different size; the rest pose of the \
-             first is kept",
+    Some(Problem::warning(
+        "other-rest",
+        format!(
+            "joint `{}` rests differently in `{}` and `{}`, so they may be figures of different size: the rest pose of the \
+             first was kept",
             joint.name, ours.name, theirs.name
         ),
-    })
+    ))
 }

@@ -1,24 +1,27 @@
-//! Left and right swapped.
+//! Mirrored clips: left and right swapped.
 
-use crate::clip::{Clip, Error, Joint, Margin, Problem, Severity};
+use crate::clip::{Clip, Error, Joint, Margin, Problem};
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// Pairs that rest farther from each other's mirror image than this part of the figure's size are told of.
+/// A pair that rests farther from its mirror image than this fraction of the figure's size is worth a warning: 8 cm in an
+/// adult. Chosen.
 const ASYMMETRIC: f64 = 0.05;
-/// A rest pose nearer to its mirror image than this part of its size says itself where the mirror stands.
+/// A rest pose that is its own mirror image to within this fraction of its size defines the mirror's plane. Chosen: rigs are
+/// symmetric but for rounding and posing by hand.
 const SYMMETRIC: f64 = 0.01;
 
-/// A plane that mirrors: points p with normal · p = offset.
+/// A plane that mirrors: all points p with normal · p = offset, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
+    /// Unit normal.
     pub normal: Unit<Vector3<f64>>,
     /// Metres from the origin.
     pub offset: f64,
 }
 
 impl Plane {
-    /// The upright plane in which the rest pose of these pairs of left and right joints is its own mirror image; for
-    /// figures that aren't symmetric at rest, the plane through their middle along X, the way that clips face.
+    /// The upright plane in which the rest pose of these pairs (left, right) of joints is its own mirror image. For figures
+    /// that aren't symmetric at rest, the plane through their middle along X, which is where clips face.
     pub fn sagittal(joints: &[Joint], pairs: &[(usize, usize)]) -> Self {
         let places = places(joints);
         let sides: Vec<(Vector3<f64>, Vector3<f64>)> = pairs
@@ -33,8 +36,11 @@ impl Plane {
         }
     }
 
-    /// The upright plane with the least squared distance between each joint and its partner's mirror image. For
-    /// differences d and middles m of the pairs, the normal n makes Σ (n·d)² − 4 Σ (n·(m − m̄))² greatest.
+    /// The upright plane with the least squared distances between joints and their partners' mirror images.
+    ///
+    /// For differences d and sums s of the pairs, s taken from their mean, the horizontal unit normal n makes
+    /// Σ (n·d)² − Σ (n·s)² greatest. This is the larger eigenvector of a symmetric 2 × 2 matrix: its angle is half that of
+    /// (xx − yy, 2 xy).
     fn fitted(sides: &[(Vector3<f64>, Vector3<f64>)]) -> Self {
         let middle = middle(sides);
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
@@ -54,7 +60,7 @@ impl Plane {
         Self { normal, offset }
     }
 
-    /// Mirror image of a point.
+    /// Mirror image of a point, metres.
     pub fn reflect(&self, p: &Vector3<f64>) -> Vector3<f64> {
         p - *self.normal * (2.0 * (self.normal.dot(p) - self.offset))
     }
@@ -64,7 +70,7 @@ impl Plane {
         v - *self.normal * (2.0 * self.normal.dot(v))
     }
 
-    /// Mirror image of a turn: axes of rotation are reflected and turn the other way.
+    /// Mirror image of a rotation: its axis is reflected, and it turns the other way round the axis.
     fn reflect_turn(&self, turn: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         let axis = -self.reflect_along(&turn.imag());
         UnitQuaternion::new_unchecked(Quaternion::from_parts(turn.w, axis))
@@ -100,7 +106,7 @@ fn rest_world(joints: &[Joint]) -> Vec<Isometry3<f64>> {
     world
 }
 
-/// Longest side of the box around the joints.
+/// Longest side of the box around the joints, metres.
 fn extent(places: &[Vector3<f64>]) -> f64 {
     let side = |axis: usize| {
         let along = places.iter().map(|p| p[axis]);
@@ -110,10 +116,11 @@ fn extent(places: &[Vector3<f64>]) -> f64 {
     (0..3).map(side).fold(0.0, f64::max)
 }
 
-/// Whose motion each joint takes over.
+/// Whose motion each joint gets.
 struct Partners {
+    /// Index of the partner: the joint itself where it has none.
     of: Vec<usize>,
-    /// Joints of one side alone, such as a weapon: they keep to their parent.
+    /// Joints that only one side has, such as a weapon: they stay as they are in their parent.
     alone: Vec<bool>,
 }
 
@@ -142,13 +149,14 @@ impl Partners {
 }
 
 impl Clip {
-    /// The clip seen in a mirror: the joints of each pair swap their motion, and all others do their own the other way
-    /// round. In the world, the turn of a joint from its rest pose is the mirror image of its partner's turn from its
-    /// rest pose, and so is the shift of a joint in its parent; axes and lengths of the bones stay as they are. Joints of
-    /// one side without a partner keep to their parent.
+    /// The clip seen in a mirror: the joints of each pair swap their motion, and every other joint does its own mirrored.
+    ///
+    /// In world axes, the rotation of a joint from its rest pose is the mirror image of its partner's rotation from its own
+    /// rest pose, and so is its shift in its parent. Axes and lengths of the bones stay as they are. Joints of one side
+    /// without a partner keep their transform in their parent.
     ///
     /// # Errors
-    /// Pairs that aren't of this clip's joints, or share one.
+    /// An [`Error`] for pairs that aren't of this clip's joints or that share one, and for a clip that contradicts itself.
     pub fn mirror(&self, pairs: &[(usize, usize)], plane: &Plane) -> Result<Clip, Error> {
         self.check()?;
         let partners = Partners::new(&self.joints, pairs)?;
@@ -166,7 +174,7 @@ impl Clip {
             before: mirrored(&self.margin.before),
             after: mirrored(&self.margin.after),
         };
-        clip.tell(self.asymmetry(pairs, plane));
+        clip.add_problems(self.asymmetry(pairs, plane));
         Ok(clip)
     }
 
@@ -178,6 +186,7 @@ impl Clip {
         plane: &Plane,
     ) -> Vec<Isometry3<f64>> {
         let turns = self.turns(frame, rest);
+        // World rotation at rest of what a joint hangs on: shifts are mirrored in world axes.
         let under = |j: usize| {
             self.joints[j]
                 .parent
@@ -207,7 +216,7 @@ impl Clip {
         mirrored
     }
 
-    /// How each joint is turned from its rest pose, in world axes.
+    /// The rotation of each joint from its rest pose, in world axes.
     fn turns(
         &self,
         frame: &[Isometry3<f64>],
@@ -229,19 +238,20 @@ impl Clip {
         let places = places(&self.joints);
         let sides: Vec<_> = pairs.iter().map(|&(l, r)| (places[l], places[r])).collect();
         let gap = plane.gap(&sides);
-        (gap > ASYMMETRIC * extent(&places)).then(|| Problem {
-            id: "asymmetric-rest".to_owned(),
-            severity: Severity::Warning,
-            message: format!(
-                "a joint rests {:.0} mm from its partner's mirror image, so the mirrored poses are off by as much; import \
-                 the clip from a file with a symmetric bind pose",
-                1e3 * gap
-            ),
+        (gap > ASYMMETRIC * extent(&places)).then(|| {
+            Problem::warning(
+                "asymmetric-rest",
+                format!(
+                    "a joint rests {:.0} mm from its partner's mirror image, and the mirrored poses are off by as much; \
+                     import the clip from a file with a symmetric bind pose",
+                    1e3 * gap
+                ),
+            )
         })
     }
 }
 
-/// Files round: rotations that are multiplied along a chain have to be exact.
+/// Normalised: files round, and the error would grow where rotations are multiplied along a chain.
 fn unit(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(*q.quaternion())
 }

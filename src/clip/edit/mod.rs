@@ -1,8 +1,8 @@
-//! Edits: every one takes a clip and gives another.
+//! Edits: each takes a clip and returns another one.
 //!
-//! Where several are wanted, this order keeps the meaning of their numbers: trim, mirror, join, cut the best loop, warp
-//! time, take travel out, put travel in, resample. Seconds of a trim are then those of the source, and speeds of travel
-//! those of the result.
+//! Several edits keep the meaning of their numbers in this order: trim, mirror, join, cut the best loop, warp time, take
+//! travel out, put travel in, resample. The seconds of a trim are then those of the source, and the speed of travel is that of
+//! the result.
 
 mod cycle;
 mod figure;
@@ -22,7 +22,7 @@ use super::sampling::MOST_FPS;
 use super::{Clip, Error, Problem};
 
 impl Clip {
-    /// What every edit relies on, and a clip that was made by hand may lack.
+    /// Checks what every edit relies on. A clip that was made by hand may lack it.
     pub(super) fn check(&self) -> Result<(), Error> {
         let unusable = |reason| {
             Err(Error::Unusable {
@@ -39,7 +39,7 @@ impl Clip {
             return unusable("a frame has more or fewer joints than the clip");
         }
         if !joints.all(|(j, joint)| joint.parent.is_none_or(|p| p < j)) {
-            return unusable("a joint stands before its parent");
+            return unusable("a joint comes before its parent");
         }
         if !(self.fps > 0.0 && self.fps <= MOST_FPS) {
             return unusable("its frame rate isn't a number from 0 to 10000");
@@ -47,8 +47,8 @@ impl Clip {
         Ok(())
     }
 
-    /// Adds the problems that aren't known yet.
-    fn tell(&mut self, problems: impl IntoIterator<Item = Problem>) {
+    /// Adds problems, each once.
+    fn add_problems(&mut self, problems: impl IntoIterator<Item = Problem>) {
         for problem in problems {
             if !self.problems.contains(&problem) {
                 self.problems.push(problem);
@@ -57,7 +57,7 @@ impl Clip {
     }
 }
 
-/// `value` where it is a number from `least` up.
+/// `value` if it is finite and not below `least`. `what` and `wanted` describe it in the error.
 fn at_least(
     what: &'static str,
     value: f64,

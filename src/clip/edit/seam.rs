@@ -1,4 +1,7 @@
-//! Seams: two poses that are to be one, and the frames around them that are bent until they are.
+//! Seams: two poses that are to become one, and the frames around them, which are bent until they do.
+//!
+//! The gap between both poses, and between their velocities, is halved. The end moves forward by one half and the start back
+//! by the other, fading out over a window with cubic Hermite weights, so that pose and velocity run on.
 
 use super::figure::Figure;
 use crate::clip::Clip;
@@ -6,27 +9,29 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 
 type Pose = Vec<Isometry3<f64>>;
 
-/// How far from a seam it is looked for what is usual there, s.
+/// Seconds on either side of a seam that show how much velocity usually changes there. Chosen: about one stride.
 const NEAR: f64 = 1.0;
-/// Velocity may change at a seam by so many times what it does from frame to frame around it: a foot that lands stops.
+/// Velocity may change at a seam by this many times the largest change from frame to frame around it, because a foot that
+/// lands stops at once. Only what exceeds that is smoothed. Chosen.
 const USUAL: f64 = 1.5;
 
-/// Frames of `clip` that are looked at on either side of a seam.
+/// How many frames of `clip` on either side of a seam are examined.
 pub(super) fn near(clip: &Clip) -> usize {
     ((NEAR * clip.fps).ceil() as usize).max(2)
 }
 
-/// A joint's shift in its parent's axes and its turn in its own, as a rotation vector.
+/// A joint's shift in its parent's axes, metres, and its turn in its own axes, a rotation vector in radians.
 type Step = Vector6<f64>;
 
-/// What one joint's end lacks to be the beginning.
+/// What is missing from one joint's end to its start.
 struct Gap {
+    /// From its pose to the start's.
     pose: Step,
-    /// The same of the velocity, per frame.
+    /// From its velocity to the start's, per frame.
     rate: Step,
 }
 
-/// Moves poses of `clip` over the ground: only its carriers know of that.
+/// Moves poses of `clip` over the ground, by changing its carriers only.
 pub(super) fn carry_all(clip: &Clip, figure: &Figure, carry: &Isometry3<f64>, poses: &mut [Pose]) {
     for (joint, footing) in figure.footings(clip) {
         let local = footing.inverse() * carry * footing;
@@ -36,13 +41,15 @@ pub(super) fn carry_all(clip: &Clip, figure: &Figure, carry: &Isometry3<f64>, po
     }
 }
 
+/// The step from one transform to another.
 fn step(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Step {
     let shift = to.translation.vector - from.translation.vector;
     let turn = (from.rotation.inverse() * to.rotation).scaled_axis();
     Step::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// Velocity of joint `j` at pose `at`, per frame, from as many poses around it as there are: second-order differences.
+/// Velocity of joint `j` at pose `at`, per frame, by differences of second order: central where there are poses on both
+/// sides, else one-sided over two poses, else over the one there is.
 fn rate(poses: &[Pose], at: usize, j: usize) -> Step {
     let to = |f: usize| step(&poses[at][j], &poses[f][j]);
     let ahead = poses.len() - 1 - at;
@@ -56,7 +63,7 @@ fn rate(poses: &[Pose], at: usize, j: usize) -> Step {
     }
 }
 
-/// Greatest change of velocity of joint `j` from frame to frame: of its shift, and of its turn.
+/// Largest change of velocity of joint `j` from frame to frame: of its shift, and of its turn.
 fn bends(poses: &[Pose], j: usize) -> (f64, f64) {
     let bend = |w: &[Pose]| step(&w[1][j], &w[2][j]) - step(&w[0][j], &w[1][j]);
     let bends = poses.windows(3).map(bend);
@@ -68,7 +75,7 @@ fn bends(poses: &[Pose], j: usize) -> (f64, f64) {
     })
 }
 
-/// What of a jump in velocity is more than `usual`.
+/// The part of a jump in velocity that exceeds `usual`.
 fn excess(jump: Vector3<f64>, usual: f64) -> Vector3<f64> {
     let size = jump.norm();
     if size > usual {
@@ -78,7 +85,7 @@ fn excess(jump: Vector3<f64>, usual: f64) -> Vector3<f64> {
     }
 }
 
-/// One side of a seam: poses, and which of them meets the other side.
+/// One side of a seam: poses, and the index of the one that meets the other side.
 #[derive(Clone, Copy)]
 pub(super) struct Side<'a> {
     pub poses: &'a [Pose],
@@ -90,7 +97,7 @@ impl Side<'_> {
         let pose = step(&self.poses[self.at][j], &start.poses[start.at][j]);
         let before = rate(self.poses, self.at, j);
         let after = rate(start.poses, start.at, j);
-        // Both angular velocities in the axes of the rotation halfway, where the sides meet.
+        // Both angular velocities in the axes of the rotation halfway between the sides, where they meet.
         let half = UnitQuaternion::from_scaled_axis(0.5 * pose.fixed_rows::<3>(3));
         let shifting = after.fixed_rows::<3>(0) - before.fixed_rows::<3>(0);
         let turning = half * after.fixed_rows::<3>(3) - half.inverse() * before.fixed_rows::<3>(3);
@@ -104,7 +111,7 @@ impl Side<'_> {
     }
 }
 
-/// What was found missing between two sides of a seam, joint by joint.
+/// The gaps between two sides of a seam, joint by joint.
 pub(super) struct Seam(Vec<Gap>);
 
 impl Seam {
@@ -114,7 +121,7 @@ impl Seam {
         Self(joints.map(|j| end.gap(&start, j)).collect())
     }
 
-    /// The seam with the velocities as they are.
+    /// The seam without the gaps in velocity.
     pub fn of_poses(self) -> Self {
         let still = |gap: Gap| Gap {
             rate: Step::zeros(),
@@ -123,7 +130,7 @@ impl Seam {
         Self(self.0.into_iter().map(still).collect())
     }
 
-    /// Bends the last `window` of these poses: half of the gap is added to the very last one.
+    /// Bends the last `window` of these poses: the very last one moves forward by half of the gap.
     pub fn bend_end(&self, poses: &mut [Pose], window: usize) {
         for (away, pose) in poses.iter_mut().rev().take(window).enumerate() {
             let (whole, rate) = fade(away, window);
@@ -131,7 +138,7 @@ impl Seam {
         }
     }
 
-    /// Bends the first `window` of these poses: half of the gap is taken from the very first one.
+    /// Bends the first `window` of these poses: the very first one moves back by half of the gap.
     pub fn bend_start(&self, poses: &mut [Pose], window: usize) {
         for (away, pose) in poses.iter_mut().take(window).enumerate() {
             let (whole, rate) = fade(away, window);
@@ -148,8 +155,8 @@ impl Seam {
     }
 }
 
-/// Cubic Hermite weights of a pose and of a velocity (in frames) `away` frames from the seam: 1 with slope 0, and 0 with
-/// slope 1, at the seam; both 0 with slope 0 at the end of the window.
+/// Cubic Hermite weights of a pose and of a velocity, `away` frames from the seam, where s = away / window: 1 − s²(3 − 2s) is
+/// 1 with slope 0 at the seam, and away · (1 − s)² is 0 with slope 1 there; both are 0 with slope 0 at the window's end.
 fn fade(away: usize, window: usize) -> (f64, f64) {
     let s = away as f64 / window.max(1) as f64;
     (

@@ -1,4 +1,4 @@
-//! Travel: the steady part of a figure's way over the ground.
+//! Travel: the steady part of a figure's path over the ground.
 
 use super::figure::{Figure, moving};
 use crate::clip::{Clip, Error};
@@ -8,7 +8,7 @@ impl Clip {
     /// Mean horizontal velocity of the figure from the first frame to the last, m/s.
     ///
     /// # Errors
-    /// A clip that was made by hand may be unusable.
+    /// An [`Error`] for a clip that contradicts itself.
     pub fn mean_velocity(&self) -> Result<Vector2<f64>, Error> {
         self.check()?;
         let figure = Figure::new(&self.joints, &moving(self));
@@ -20,7 +20,7 @@ impl Clip {
         Ok((place(last) - place(0)).xy() / self.duration())
     }
 
-    /// The clip on the spot: its mean horizontal velocity is taken out, its sway stays.
+    /// The clip on the spot: without its mean horizontal velocity, but with its sway.
     ///
     /// # Errors
     /// As for [`Clip::mean_velocity`].
@@ -28,10 +28,10 @@ impl Clip {
         self.travel(-self.mean_velocity()?)
     }
 
-    /// The clip with `velocity` over the ground, m/s, added to whatever it does.
+    /// The clip with `velocity` over the ground (world X and Y, m/s) added to its motion.
     ///
     /// # Errors
-    /// A velocity that isn't finite.
+    /// An [`Error`] for a velocity that isn't finite.
     pub fn travel(&self, velocity: Vector2<f64>) -> Result<Clip, Error> {
         self.check()?;
         if !(velocity.norm() * self.duration()).is_finite() {

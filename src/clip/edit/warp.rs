@@ -1,18 +1,18 @@
-//! The same motion in another time.
+//! The same motion in another time: playback speed and time-warps.
 
 use crate::clip::{Clip, Error};
 
-/// Longest time that is looked at, s: more can't be sampled anyhow.
+/// Longest time that a point may have, seconds. Chosen: far more than can be sampled.
 const LONGEST: f64 = 1e9;
 
 /// Smallest factor of speed; a smaller one would stretch the shortest clip over days.
 const SLOWEST: f64 = 1e-6;
 
 impl Clip {
-    /// The clip `factor` times as fast, sampled at `fps`.
+    /// The clip played `factor` times as fast (0.000001 or more), sampled at `fps` Hz.
     ///
     /// # Errors
-    /// A factor that isn't positive, a rate that can't be sampled, or more frames than a clip may have.
+    /// An [`Error`] for a factor out of range, a rate that can't be sampled, and more frames than a clip may have.
     pub fn speed(&self, factor: f64, fps: f64) -> Result<Clip, Error> {
         self.check()?;
         if !(factor.is_finite() && factor >= SLOWEST) {
@@ -25,12 +25,14 @@ impl Clip {
         self.warp(&[(duration, duration / factor)], fps)
     }
 
-    /// The clip in another time, sampled at `fps`: what is at second `a` comes to second `b` for each of `points`
-    /// (a, b), and the start stays at 0. Between them time runs along a monotone cubic curve without jumps in speed
-    /// (Fritsch and Butland, 1984); after the last it runs as before.
+    /// The clip in another time, sampled at `fps` Hz: for each of `points` (a, b), what is at `a` seconds moves to `b` seconds.
+    /// The start stays at 0. Between the points time runs along a monotone cubic curve without jumps in speed (Fritsch and
+    /// Butland, "A method for constructing local monotone piecewise cubic interpolants", 1984); after the last one it runs
+    /// at the clip's own speed.
     ///
     /// # Errors
-    /// Points that don't rise, or that lie beyond the clip's end.
+    /// An [`Error`] for points that don't rise or lie beyond the clip's end, a rate that can't be sampled, and more frames
+    /// than a clip may have.
     pub fn warp(&self, points: &[(f64, f64)], fps: f64) -> Result<Clip, Error> {
         self.check()?;
         let knots = knots(points, self.duration())?;
@@ -48,7 +50,7 @@ fn knots(points: &[(f64, f64)], duration: f64) -> Result<Vec<(f64, f64)>, Error>
     let points = points.iter().skip_while(|point| **point == (0.0, 0.0));
     for &(from, to) in points {
         let before = knots[knots.len() - 1];
-        // The end of a clip is typed with fewer digits than it has.
+        // People type the end of a clip with fewer digits than it has: up to a millisecond beyond is meant as the end.
         let from = if from > duration && from <= duration + 1e-3 {
             duration
         } else {
@@ -66,7 +68,8 @@ fn knots(points: &[(f64, f64)], duration: f64) -> Result<Vec<(f64, f64)>, Error>
     Ok(knots)
 }
 
-/// Slope of the curve at each knot: the harmonic mean of its neighbours' secants, weighted by their lengths.
+/// Slope of the curve at each knot: the harmonic mean of the secants on both sides, weighted by their lengths (Fritsch and
+/// Butland). It never exceeds what keeps the curve rising.
 fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
     let secant = |k: usize| (knots[k + 1].1 - knots[k].1) / (knots[k + 1].0 - knots[k].0);
     let last = knots.len() - 1;
@@ -84,7 +87,7 @@ fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
     (0..=last).map(slope).collect()
 }
 
-/// Source time of a new time.
+/// The time in the source, seconds, of a new time: the cubic Hermite curve between the two knots around it.
 fn source(knots: &[(f64, f64)], slopes: &[f64], time: f64) -> f64 {
     let above = knots.partition_point(|knot| knot.0 <= time);
     let (Some(&(t1, s1)), Some(k)) = (knots.get(above), above.checked_sub(1)) else {

@@ -7,30 +7,33 @@ use crate::clip::Problem;
 use crate::import::names::first_few;
 use std::collections::BTreeMap;
 
-/// A bone's place in a row.
+/// A bone's numbers in a row.
 pub(super) struct Column {
+    /// Index of the bone in the skeleton.
     pub bone: usize,
+    /// Index of its first number in a row.
     pub first: usize,
 }
 
 /// The frames of an AMC file.
 pub(super) struct Motion {
-    /// The bones that the first frame names; the others stay at rest.
+    /// The bones that the first frame names. All others stay at rest.
     pub columns: Vec<Column>,
     /// Numbers of all frames, one frame after the other, in the file's units and radians.
     numbers: Vec<f64>,
     width: usize,
-    /// Frames per second, Hz, where that is stated.
+    /// Frames per second, Hz, if stated.
     pub rate: Option<f64>,
     pub problems: Vec<Problem>,
 }
 
 impl Motion {
-    /// One at least.
+    /// Number of frames, at least one.
     pub fn frames(&self) -> usize {
         self.numbers.len() / self.width
     }
 
+    /// The numbers of frame `frame`.
     pub fn row(&self, frame: usize) -> &[f64] {
         &self.numbers[frame * self.width..(frame + 1) * self.width]
     }
@@ -44,17 +47,17 @@ struct Reader<'s> {
     is_radian: bool,
     rate: Option<f64>,
     columns: Vec<Column>,
-    /// Column of a bone, and the frame that named it last.
+    /// By bone: its column, and the last frame that named it, counted from 1.
     places: BTreeMap<usize, (usize, usize)>,
     numbers: Vec<f64>,
     width: usize,
-    /// Frames that were begun, and how many bones the last of them has named.
+    /// How many frames have begun, and how many bones the last of them has named so far.
     begun: usize,
     named: usize,
     problems: Vec<Problem>,
 }
 
-/// Reads the motion of `skeleton`. A last frame that was cut off is left out.
+/// Reads the motion of `skeleton`. A last frame that was cut off is left out, with a warning.
 pub(super) fn read(text: &str, skeleton: &Skeleton) -> Result<Motion, AcclaimError> {
     let bones = skeleton.bones.iter().enumerate();
     let own = bones.filter(|(_, bone)| !bone.is_end);
@@ -74,7 +77,7 @@ pub(super) fn read(text: &str, skeleton: &Skeleton) -> Result<Motion, AcclaimErr
     let mut lines = lines(text).peekable();
     while let Some(mut line) = lines.next() {
         let read = reader.line(&mut line);
-        // A cut can only be where a frame isn't whole.
+        // An error in the last line of an incomplete frame comes from the cut: the frame is left out below.
         if lines.peek().is_some() || reader.named == reader.columns.len() {
             read?;
         }
@@ -116,7 +119,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The frame before `line` must have named all bones that the first has.
+    /// Checks that the frame before `line` named all bones of the first one.
     fn check_whole(&self, line: &Line) -> Result<(), AcclaimError> {
         let (named, all) = (self.named, self.columns.len());
         if self.begun > 0 && named != all {
@@ -152,11 +155,12 @@ impl Reader<'_> {
         if let Some(extra) = line.next() {
             return Err(line.unexpected(extra, "the end of the bone's degrees of freedom"));
         }
-        self.keep(bone, place, &row);
+        self.store(bone, place, &row);
         Ok(())
     }
 
-    fn keep(&mut self, bone: usize, place: usize, row: &[f64]) {
+    /// Stores a bone's numbers of the current frame.
+    fn store(&mut self, bone: usize, place: usize, row: &[f64]) {
         if place == self.columns.len() {
             let first = self.width;
             self.columns.push(Column { bone, first });

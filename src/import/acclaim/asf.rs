@@ -1,13 +1,13 @@
-//! ASF: the skeleton.
+//! ASF: the skeleton. Its sections come in any order, so bones are collected first and put together at the end.
 
 use super::error::AcclaimError;
 use super::lines::{Line, lines, short};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
-/// Most bones that a skeleton may have.
+/// Most bones that a skeleton may have. Chosen, as a bound on memory.
 const MOST_BONES: usize = 1 << 16;
-/// The CMU database and those after it count `length` units to an inch.
+/// The CMU database, and those made like it, have `length` units in an inch.
 const INCH_M: f64 = 0.0254;
 const ROOT: &str = "root";
 
@@ -19,7 +19,7 @@ pub(super) enum Freedom {
     Length,
 }
 
-/// A bone, or the end of one that has none behind it.
+/// A bone, or the end of one without children.
 #[derive(Clone, Debug)]
 pub(super) struct Bone {
     pub name: String,
@@ -28,22 +28,23 @@ pub(super) struct Bone {
     pub offset: Vector3<f64>,
     /// World from the bone's axes.
     pub axes: UnitQuaternion<f64>,
-    /// In the order of its numbers, in which rotations are done, too.
+    /// In the order of its numbers in a frame, in which rotations are applied too.
     pub freedoms: Vec<Freedom>,
+    /// Whether it is only the end of its parent.
     pub is_end: bool,
 }
 
 /// The skeleton of an ASF file.
 pub(super) struct Skeleton {
-    /// The root first, and parents before their children.
+    /// The root first, parents before their children.
     pub bones: Vec<Bone>,
-    /// Metres per unit, where that is stated.
+    /// Metres per unit, if stated.
     pub unit_m: Option<f64>,
-    /// Angles are in radians, not degrees.
+    /// Whether angles are in radians instead of degrees.
     pub is_radian: bool,
 }
 
-/// A bone as the file has it, which may state its angles' unit later.
+/// A bone as the file has it: the unit of its angles may be stated later.
 struct Draft {
     line: usize,
     name: String,
@@ -56,12 +57,13 @@ struct Draft {
 
 /// What has been read so far.
 struct Reader {
+    /// Units per inch.
     length: Option<f64>,
     is_radian: bool,
     root: Draft,
     position: [f64; 3],
     bones: Vec<Draft>,
-    /// A bone's names of its children, with the line that names them.
+    /// Names of every bone's children, with the lines that name them.
     children: BTreeMap<String, Vec<(usize, String)>>,
     /// How many names the hierarchy has so far.
     named: usize,
@@ -88,7 +90,7 @@ pub(super) fn read(text: &str) -> Result<Skeleton, AcclaimError> {
             ":units" => reader.unit(&mut line)?,
             ":root" => reader.root(&mut line)?,
             ":bonedata" => reader.bone(&mut line)?,
-            ":hierarchy" => reader.family(&mut line)?,
+            ":hierarchy" => reader.children(&mut line)?,
             _ => {}
         }
     }
@@ -140,7 +142,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Whatever isn't known of a bone (its limits, masses, markers) is passed over.
+    /// Reads a line about a bone; its limits, masses and markers are skipped.
     fn bone(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
         let key = line.key.to_ascii_lowercase();
         if key == "begin" {
@@ -168,7 +170,8 @@ impl Reader {
         Ok(())
     }
 
-    fn family(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
+    /// Reads a line of the hierarchy: a bone and its children.
+    fn children(&mut self, line: &mut Line) -> Result<(), AcclaimError> {
         if matches!(line.key.to_ascii_lowercase().as_str(), "begin" | "end") {
             return Ok(());
         }
@@ -202,8 +205,8 @@ impl Reader {
                 return broken(line, reason, "rename one of them");
             }
         }
-        let mut bones = vec![self.grown(&self.root, None, Vector3::from(self.position))];
-        let mut open = self.waiting(ROOT, 0, Vector3::zeros());
+        let mut bones = vec![self.finished(&self.root, None, Vector3::from(self.position))];
+        let mut open = self.children_of(ROOT, 0, Vector3::zeros());
         while let Some((line, name, parent, offset)) = open.pop() {
             let Some(draft) = drafts.remove(&name) else {
                 let name = short(&name);
@@ -212,11 +215,11 @@ impl Reader {
             };
             let along = Vector3::from(draft.direction) * draft.length;
             let bone = bones.len();
-            bones.push(self.grown(&draft, Some(parent), offset));
-            let behind = self.waiting(&name, bone, along);
+            bones.push(self.finished(&draft, Some(parent), offset));
+            let behind = self.children_of(&name, bone, along);
             if behind.is_empty() {
                 let end = Draft::new(0, &format!("{name}_end"));
-                bones.push(self.grown(&end, Some(bone), along));
+                bones.push(self.finished(&end, Some(bone), along));
             }
             open.extend(behind);
         }
@@ -233,8 +236,8 @@ impl Reader {
         })
     }
 
-    /// Children of a bone, the last first: line, name, parent, and offset from the parent's start.
-    fn waiting(
+    /// Children of a bone, the last first: line, name, index of the parent, and offset from the parent's start.
+    fn children_of(
         &mut self,
         name: &str,
         parent: usize,
@@ -247,7 +250,8 @@ impl Reader {
             .collect()
     }
 
-    fn grown(&self, draft: &Draft, parent: Option<usize>, offset: Vector3<f64>) -> Bone {
+    /// The finished bone of a draft.
+    fn finished(&self, draft: &Draft, parent: Option<usize>, offset: Vector3<f64>) -> Bone {
         Bone {
             name: draft.name.clone(),
             parent,
@@ -258,7 +262,7 @@ impl Reader {
         }
     }
 
-    /// Angles about x, y, z, done in the bone's order about axes that stay.
+    /// The rotation by the angles about x, y and z, applied in the bone's order about fixed axes.
     fn axes(&self, draft: &Draft) -> UnitQuaternion<f64> {
         let about = |axis: usize| {
             let angle = draft.angles[axis];

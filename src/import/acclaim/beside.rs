@@ -1,11 +1,11 @@
-//! Where the skeleton of a motion is.
+//! Finds the skeleton of a motion in the folder beside it.
 
 use super::error::AcclaimError;
 use crate::import::names::stem;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Largest skeleton that is read, in bytes; those of people have about ten thousand.
+/// Largest skeleton that is read, in bytes. Chosen: those of people have about ten thousand.
 const MOST_BYTES: u64 = 16 << 20;
 
 /// Path and bytes of the skeleton for the motion `file` in `folder`: the `.asf` of its name, or of its name without what
@@ -58,6 +58,7 @@ fn skeletons(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
+/// The skeleton whose name is that of `file`, or the longest start of it up to a `_`; else the only one.
 fn belonging<'p>(file: &str, skeletons: &'p [PathBuf]) -> Option<&'p PathBuf> {
     let mut name = stem(file);
     loop {

@@ -1,19 +1,21 @@
-//! Lines of words, as both files have them.
+//! Lines of words, of which both files consist.
 
 use super::error::AcclaimError;
 use std::str::SplitWhitespace;
 
-/// Numbers beyond this are damage, in the file's units or degrees.
+/// Numbers beyond this are damage, in the file's units or degrees. Chosen.
 const MOST: f64 = 1e9;
 
 /// A line's first word and what follows it.
 pub(super) struct Line<'a> {
+    /// Counted from 1.
     pub number: usize,
+    /// The first word.
     pub key: &'a str,
     words: SplitWhitespace<'a>,
 }
 
-/// The lines of a text that hold more than blanks or a comment.
+/// The lines of a text, without blank ones and comments.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     text.lines().enumerate().filter_map(|(number, line)| {
@@ -28,15 +30,18 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
 }
 
 impl<'a> Line<'a> {
+    /// The next word.
     pub fn next(&mut self) -> Option<&'a str> {
         self.words.next()
     }
 
+    /// The next word, which must be there.
     pub fn expect(&mut self, expected: &'static str) -> Result<&'a str, AcclaimError> {
         self.next()
             .ok_or_else(|| self.unexpected("the line's end", expected))
     }
 
+    /// The next word as a number.
     pub fn number(&mut self, expected: &'static str) -> Result<f64, AcclaimError> {
         let word = self.expect(expected)?;
         match word.parse() {
@@ -45,6 +50,7 @@ impl<'a> Line<'a> {
         }
     }
 
+    /// The next words as numbers.
     pub fn numbers<const N: usize>(
         &mut self,
         expected: &'static str,
@@ -56,6 +62,7 @@ impl<'a> Line<'a> {
         Ok(numbers)
     }
 
+    /// The error of a word where another should be.
     pub fn unexpected(&self, found: &str, expected: &'static str) -> AcclaimError {
         AcclaimError::Unexpected {
             line: self.number,
@@ -64,6 +71,7 @@ impl<'a> Line<'a> {
         }
     }
 
+    /// The error of a line that contradicts others.
     pub fn broken(&self, reason: String, remedy: &'static str) -> AcclaimError {
         AcclaimError::Broken {
             line: self.number,

@@ -1,7 +1,8 @@
 //! Acclaim's pair of text files: ASF, a skeleton, and AMC, its motion.
 //!
-//! A bone begins where its parent ends. With C the rotation of its axes and M that of its degrees of freedom, it stands in
-//! its parent by the parent's direction × length and then C · M · C⁻¹, so that without motion all is aligned to the world.
+//! A bone begins where its parent ends. With C the rotation of its axes and M that of its degrees of freedom, its transform in
+//! its parent is the translation by the parent's direction × length, then the rotation C · M · C⁻¹. So without motion all
+//! bones are aligned with the world.
 
 mod amc;
 mod asf;
@@ -19,7 +20,7 @@ use error::AcclaimError;
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Rate of the CMU motion capture database, Hz: AMC files don't state theirs.
+/// Rate of the CMU motion capture database, Hz: most AMC files don't state theirs.
 const USUAL_RATE: f64 = 120.0;
 
 /// A skeleton and, from an AMC file, its motion.
@@ -102,7 +103,7 @@ fn take(name: &str, motion: &Motion) -> Take {
     }
 }
 
-/// World places of the bones' starts without any motion.
+/// World positions of the bones' starts without motion, in the file's units.
 fn rest(bones: &[Bone]) -> Vec<Vector3<f64>> {
     let mut places: Vec<Vector3<f64>> = Vec::with_capacity(bones.len());
     for bone in bones {
@@ -118,7 +119,7 @@ fn local(bone: &Bone, numbers: &[f64]) -> Isometry3<f64> {
     for (freedom, &number) in bone.freedoms.iter().zip(numbers) {
         match *freedom {
             Freedom::Translation(axis) => place[axis] += number,
-            // The first is done first, about axes that stay.
+            // The first rotation is applied first, about fixed axes, so the next ones multiply from the left.
             Freedom::Rotation(axis) => {
                 let axis = Vector3::ith_axis(axis);
                 turn = UnitQuaternion::from_axis_angle(&axis, number) * turn;
@@ -144,7 +145,8 @@ impl AcclaimScene {
         locals
     }
 
-    /// The same between frames.
+    /// The same at a time in seconds: linear between frames, and rotations along the shortest arc. A billionth of a frame
+    /// is rounding.
     fn locals_at(&self, motion: &Motion, time: f64) -> Vec<Isometry3<f64>> {
         let rate = motion.rate.unwrap_or(USUAL_RATE);
         let (position, last) = ((time * rate).max(0.0), motion.frames() - 1);

@@ -4,7 +4,7 @@ use super::error::BvhError;
 use super::words::Words;
 use nalgebra::Vector3;
 
-/// Most joints that a file may have, and how deep they may be nested.
+/// Most joints that a file may have. Chosen, as a bound on memory.
 const MOST_JOINTS: usize = 1 << 16;
 
 /// One number of a frame: along or about an axis.
@@ -17,13 +17,15 @@ pub(super) enum Channel {
 /// A joint or the end of a limb.
 #[derive(Debug)]
 pub(super) struct Joint {
+    /// Its name; an end site without one is called after its joint.
     pub name: String,
+    /// Index of the parent; `None` for a root.
     pub parent: Option<usize>,
-    /// Place in the parent, in the file's units.
+    /// Position in the parent, in the file's units.
     pub offset: Vector3<f64>,
     /// In the order of the numbers in a frame, which is the order in which rotations are composed.
     pub channels: Vec<Channel>,
-    /// Where its numbers begin in a frame.
+    /// Index of its first number in a frame.
     pub first: usize,
 }
 
@@ -68,6 +70,7 @@ pub(super) fn hierarchy(words: &mut Words) -> Result<Vec<Joint>, BvhError> {
     }
 }
 
+/// Opens the block of a new joint, whose numbers begin at `first`.
 fn begin(
     words: &mut Words,
     joints: &mut Vec<Joint>,
@@ -93,6 +96,7 @@ fn begin(
     Ok(())
 }
 
+/// The name of an end site, given what follows the word `End`.
 fn end_name(joints: &[Joint], open: &[usize], site: &str) -> String {
     let named = site.strip_prefix("Site").unwrap_or(site).trim();
     match open.last() {
@@ -101,6 +105,7 @@ fn end_name(joints: &[Joint], open: &[usize], site: &str) -> String {
     }
 }
 
+/// The joint whose block is open; `word` belongs to it.
 fn last<'j>(
     words: &Words,
     joints: &'j mut [Joint],

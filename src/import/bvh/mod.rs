@@ -15,7 +15,7 @@ use hierarchy::{Channel, Joint, hierarchy};
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
 use words::Words;
 
-/// Rate of a file whose frame time can't be used, Hz.
+/// Rate of a file whose frame time can't be used, Hz. Chosen.
 const USUAL_RATE: f64 = 30.0;
 
 /// A BVH file.
@@ -24,7 +24,9 @@ pub(crate) struct BvhScene {
     joints: Vec<Joint>,
     /// Numbers of all frames, one frame after the other.
     numbers: Vec<f64>,
+    /// Numbers per frame.
     width: usize,
+    /// Frames per second, Hz.
     rate: f64,
 }
 
@@ -69,7 +71,7 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<BvhScene, BvhError> {
     })
 }
 
-/// Count of frames and frames per second, as the header has them.
+/// The number of frames that the header states, and the frame rate by its frame time, Hz.
 fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(f64, f64), BvhError> {
     words.keyword("Frames:")?;
     let count = words.number("a number of frames")?;
@@ -89,7 +91,7 @@ fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(f64, f64), 
     Ok((count, rate))
 }
 
-/// Numbers of whole frames.
+/// The numbers of all complete frames.
 fn numbers(
     words: &mut Words,
     width: usize,
@@ -122,7 +124,7 @@ fn other_count(stated: f64, found: usize) -> Option<Problem> {
     })
 }
 
-/// World places of the joints without any rotation.
+/// World positions of the joints at rest, in the file's units.
 fn rest(joints: &[Joint]) -> Vec<Vector3<f64>> {
     let mut places: Vec<Vector3<f64>> = Vec::with_capacity(joints.len());
     for joint in joints {
@@ -133,8 +135,8 @@ fn rest(joints: &[Joint]) -> Vec<Vector3<f64>> {
 }
 
 impl BvhScene {
-    /// Transform of a joint in its parent at a frame. A position channel replaces the offset along its axis, as the
-    /// files with channels of both kinds on every joint mean it.
+    /// Transform of a joint in its parent at a frame. A position channel replaces the offset along its axis: files with both
+    /// kinds of channel on every joint repeat the offset there. Rotations multiply in the order of their channels.
     fn local(&self, joint: &Joint, frame: usize) -> Isometry3<f64> {
         let numbers = &self.numbers[frame * self.width + joint.first..];
         let mut place = joint.offset;
@@ -151,7 +153,8 @@ impl BvhScene {
         Isometry3::from_parts(Translation3::from(place), turn)
     }
 
-    /// The same between frames.
+    /// The same at a position counted in frames: linear between frames, and rotations along the shortest arc. A billionth of
+    /// a frame is rounding.
     fn local_at(&self, joint: &Joint, position: f64) -> Isometry3<f64> {
         let last = self.numbers.len() / self.width - 1;
         let frame = (position as usize).min(last);

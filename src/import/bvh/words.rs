@@ -1,13 +1,14 @@
-//! Words of a BVH file and the lines that they stand on.
+//! Words of a BVH file and the lines that they are on.
 
 use super::error::BvhError;
 
-/// Coordinates beyond this are damage, in the file's units or degrees.
+/// Numbers beyond this are damage, in the file's units or degrees. Chosen.
 const MOST: f64 = 1e9;
 
-/// Words of a text with the lines that they stand on.
+/// The words of a text, one after the other. Line ends are blanks to the format, except after a joint's name.
 pub(super) struct Words<'a> {
     lines: std::iter::Enumerate<std::str::Lines<'a>>,
+    /// Line of the last word, counted from 1.
     pub line: usize,
     rest: &'a str,
 }
@@ -55,6 +56,7 @@ impl<'a> Words<'a> {
         name.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
+    /// The next word, which must be there.
     pub fn expect(&mut self, expected: &'static str) -> Result<&'a str, BvhError> {
         let line = self.line;
         self.next().ok_or(BvhError::Missing {
@@ -63,6 +65,7 @@ impl<'a> Words<'a> {
         })
     }
 
+    /// Reads the word `word`, in any letter case.
     pub fn keyword(&mut self, word: &'static str) -> Result<(), BvhError> {
         match self.expect(word)? {
             found if found.eq_ignore_ascii_case(word) => Ok(()),
@@ -70,11 +73,13 @@ impl<'a> Words<'a> {
         }
     }
 
+    /// The next word as a number.
     pub fn number(&mut self, what: &'static str) -> Result<f64, BvhError> {
         let word = self.expect(what)?;
         self.parsed(word, what)
     }
 
+    /// `word` as a number.
     pub fn parsed(&self, word: &str, what: &'static str) -> Result<f64, BvhError> {
         // Some locales write a decimal comma.
         let number = word.parse().or_else(|_| word.replacen(',', ".", 1).parse());
@@ -84,6 +89,7 @@ impl<'a> Words<'a> {
         }
     }
 
+    /// The error of a word where another should be.
     pub fn unexpected(&self, found: &str, expected: &'static str) -> BvhError {
         BvhError::Unexpected {
             line: self.line,

@@ -1,16 +1,18 @@
 //! FBX. Binary files of versions 7.0 to 7.9 are read here, all others, with the feature `ufbx`, by that library.
 
+mod animation;
 mod array;
 mod bind;
 #[cfg(feature = "ufbx")]
 mod by_ufbx;
 mod contents;
 mod curve;
+mod curves;
 mod document;
 mod error;
 mod key;
 mod keys;
-mod layers;
+mod layer;
 mod nodes;
 mod numbers;
 mod objects;
@@ -36,15 +38,17 @@ mod rewritten;
 #[cfg(test)]
 mod synthetic;
 
+pub(crate) use document::is_ascii;
+
 use crate::clip::Problem;
 use crate::explain::Explain;
 use crate::import::scene::{Contents, Scene, Take};
+use animation::Animation;
 use contents::{bound, constraints_left_out, contents};
 use curve::Curve;
+use curves::Curves;
 use document::Document;
-pub(crate) use document::is_ascii;
 use error::FbxError;
-use layers::{Animation, Curves};
 use nalgebra::Matrix4;
 use nodes::{Rig, Tree};
 use objects::Graph;

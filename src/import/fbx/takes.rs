@@ -1,8 +1,8 @@
 //! Takes: their time span, frame rate, and what they move.
 
+use super::animation::Animation;
 use super::curve::Curve;
 use super::document::Document;
-use super::layers::Animation;
 use super::properties::Properties;
 use super::record::Element;
 use crate::clip::Problem;

@@ -1,4 +1,4 @@
-//! Numbers out of a glTF file's buffers. Every index, offset, stride and count is checked against the bytes there are.
+//! Numbers out of a glTF file's buffers. Every index, offset, stride and count is checked against the bytes that there are.
 
 use super::buffer::Buffers;
 use super::document::{Document, size};
@@ -9,21 +9,21 @@ use gltf::json::{Index, buffer::View};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Numbers that all accessors of a file may hold together, and how many more per byte that was read: no real file
-/// reads its bytes many times over, but a few bytes of JSON can ask for any amount.
+/// Numbers that all accessors of a file may hold together, and how many more per byte that was read. Real files don't read
+/// their bytes many times over, but a few bytes of JSON can ask for any amount. Chosen.
 const FREE_NUMBERS: usize = 1 << 16;
 const NUMBERS_PER_BYTE: usize = 4;
-/// Most numbers that curves may be given together, counting a shared accessor each time.
+/// Most numbers that all curves together may use, counting a shared accessor each time. Chosen, as a bound on time.
 const MOST_GIVEN: usize = 1 << 28;
 
-/// Reads accessors, each once.
+/// Reads accessors, each of them once.
 pub(super) struct Accessors<'a> {
     document: &'a Document,
     buffers: Buffers<'a>,
     done: BTreeMap<usize, Rc<[f64]>>,
-    /// Numbers held.
+    /// Numbers in memory.
     numbers: usize,
-    /// Numbers given to curves.
+    /// Numbers handed out, counting a shared accessor each time.
     given: usize,
 }
 
@@ -54,7 +54,7 @@ impl<'a> Accessors<'a> {
         self.buffers.bytes_beside()
     }
 
-    /// Whether the file has this accessor and nothing is in it.
+    /// Whether the file has this accessor and it is empty.
     pub fn is_empty(&self, accessor: Index<Accessor>) -> bool {
         self.document
             .accessors
@@ -62,7 +62,7 @@ impl<'a> Accessors<'a> {
             .is_some_and(|about| about.count.0 == 0)
     }
 
-    /// All numbers of an accessor whose elements are of type `wanted`, in order.
+    /// All numbers of an accessor whose elements must be of type `wanted`, in order.
     pub fn read(
         &mut self,
         accessor: Index<Accessor>,
@@ -97,7 +97,7 @@ impl<'a> Accessors<'a> {
         Ok(numbers)
     }
 
-    /// Counts numbers that are about to be held.
+    /// Counts numbers that are about to be put in memory.
     fn hold(&mut self, numbers: usize) -> Result<(), Fault> {
         self.numbers = self.numbers.saturating_add(numbers);
         let most = self.buffers.bytes().saturating_mul(NUMBERS_PER_BYTE);
@@ -108,6 +108,7 @@ impl<'a> Accessors<'a> {
         Ok(())
     }
 
+    /// The numbers of an accessor, `width` per element: those of its buffer view, or zeros, with its sparse values over them.
     fn numbers(&mut self, about: &Accessor, width: usize) -> Result<Vec<f64>, Fault> {
         let count = size(about.count);
         let length = count.checked_mul(width).ok_or("too many elements")?;
@@ -151,7 +152,8 @@ impl<'a> Accessors<'a> {
         Ok(numbers)
     }
 
-    /// The elements that `layout` describes, provided that all of them lie in the view and the view in its buffer.
+    /// The numbers of the elements that `layout` describes, if all of them are inside the view and the view is inside its
+    /// buffer.
     fn elements(&mut self, layout: &Layout) -> Result<Vec<f64>, Fault> {
         let view = self.document.buffer_views.get(layout.view);
         let view = view.ok_or_else(|| format!("no buffer view {}", layout.view))?;
@@ -215,7 +217,7 @@ fn overwrite(
     Ok(())
 }
 
-/// The number that `bytes` hold. Normalised integers become −1…1 or 0…1 (specification §3.6.2.2).
+/// The number in `bytes`. Normalised integers become −1…1 or 0…1 (glTF 2.0 specification, §3.6.2.2).
 fn number(component: ComponentType, bytes: &[u8], normalized: bool) -> f64 {
     let mut word = [0; 4];
     word.iter_mut()

@@ -1,4 +1,4 @@
-//! The bind transforms that skins tell.
+//! The bind transforms of skins.
 
 use super::accessor::Accessors;
 use super::document::Document;
@@ -7,7 +7,7 @@ use crate::import::bind::Binds;
 use gltf::json::{Skin, accessor::Type};
 use nalgebra::Matrix4;
 
-/// Bind transforms of every skin's joints. A skin that can't be read has none: the mesh needs it, the motion doesn't.
+/// Bind transforms of every skin's joints. A skin that can't be read has none: only its mesh needs it, the motion doesn't.
 pub(super) fn binds<'a>(
     document: &'a Document,
     tree: &'a Tree,

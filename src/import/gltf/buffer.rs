@@ -6,17 +6,19 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-/// Most bytes that all external buffers of a file may have together.
+/// Most bytes that all external buffers of a file may have together. Chosen, as for the file itself.
 const MOST_BYTES: u64 = 2 << 30;
 
-/// Buffers, each fetched when it is first needed: a mesh's missing buffer doesn't keep the motion from being read.
+/// Buffers, each read when it is first needed: a missing buffer of a mesh doesn't keep the motion from being read.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
+    /// The binary chunk of a GLB.
     bin: Option<&'a [u8]>,
+    /// Where external buffers are.
     folder: Option<&'a Path>,
     fetched: BTreeMap<usize, Cow<'a, [u8]>>,
     external_bytes: u64,
-    /// Bytes fetched: all, and those from other files.
+    /// Bytes read so far: all, and those from other files.
     bytes: usize,
     bytes_beside: usize,
 }
@@ -47,7 +49,7 @@ impl<'a> Buffers<'a> {
         Ok(self.fetched.get(&buffer).map_or(&[], |bytes| bytes))
     }
 
-    /// How many bytes have been fetched.
+    /// How many bytes have been read.
     pub fn bytes(&self) -> usize {
         self.bytes
     }

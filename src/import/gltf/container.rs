@@ -4,14 +4,14 @@ use super::error::GltfError;
 use gltf::Glb;
 use gltf::binary::Error;
 
-/// Bytes of a GLB header, which its length counts too.
+/// Bytes of a GLB's header; the length that it states includes them.
 const HEADER: u32 = 12;
 
 /// Takes a GLB file apart.
 pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, GltfError> {
     let length = bytes.get(8..).and_then(<[u8]>::first_chunk);
     let length = length.map(|word| u32::from_le_bytes(*word));
-    // `Glb` subtracts the header from the length unchecked.
+    // `Glb` subtracts the header from the stated length unchecked, and would panic.
     if length.is_none_or(|length| length < HEADER) {
         return Err(broken("the GLB header is cut off".to_owned()));
     }

@@ -5,10 +5,11 @@ use gltf::json::animation::Interpolation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::rc::Rc;
 
-/// A step falls on a key when it comes this near before it, in seconds: key times are rounded to 32 bits.
+/// A step happens at a time this near before its key, seconds: key times are rounded to 32 bits, which is half a microsecond
+/// at ten seconds.
 const STEP_TOLERANCE: f64 = 1e-6;
 
-/// Keys of `N` numbers (a vector, or a quaternion x, y, z, w).
+/// Keys with `N` numbers each: a vector, or a quaternion x, y, z, w.
 pub(super) struct Curve<const N: usize> {
     times: Rc<[f64]>,
     values: Rc<[f64]>,
@@ -16,7 +17,7 @@ pub(super) struct Curve<const N: usize> {
 }
 
 impl<const N: usize> Curve<N> {
-    /// Checks that there are keys, in order and finite, with a value each.
+    /// A curve, after checking that it has keys, in order and finite, each with its values.
     pub fn new(
         times: Rc<[f64]>,
         values: Rc<[f64]>,
@@ -53,11 +54,12 @@ impl<const N: usize> Curve<N> {
         })
     }
 
+    /// Times of the keys, seconds.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// Value at `time`; the first and last keys hold outside.
+    /// Value at `time` seconds. Outside the keys the first or the last one holds.
     pub fn at(&self, time: f64) -> [f64; N] {
         let (a, b, t, gap) = self.around(time);
         match self.interpolation {
@@ -70,7 +72,7 @@ impl<const N: usize> Curve<N> {
         }
     }
 
-    /// Key before `time`, key after it, how far between them, and the seconds between them.
+    /// The key before `time`, the key after it, the fraction of the way between them, and the seconds between them.
     fn around(&self, time: f64) -> (usize, usize, f64, f64) {
         let after = self.times.partition_point(|&key| key <= time);
         let (a, b) = (after.saturating_sub(1), after.min(self.times.len() - 1));
@@ -83,6 +85,7 @@ impl<const N: usize> Curve<N> {
         (a, b, t, gap)
     }
 
+    /// The key whose value holds at `time`.
     fn step(&self, time: f64) -> usize {
         self.times
             .partition_point(|&key| key <= time + STEP_TOLERANCE)
@@ -96,7 +99,7 @@ impl<const N: usize> Curve<N> {
         }
     }
 
-    /// In-tangent (0), value (1) or out-tangent (2) of a cubic spline's key.
+    /// The in-tangent (part 0), value (1) or out-tangent (2) of a cubic spline's key.
     fn part(&self, key: usize, part: usize) -> [f64; N] {
         self.numbers((3 * key + part) * N)
     }
@@ -105,7 +108,7 @@ impl<const N: usize> Curve<N> {
         std::array::from_fn(|k| self.values[at + k])
     }
 
-    /// Cubic Hermite spline; tangents are per second, so they are scaled by the gap (specification, appendix C).
+    /// Cubic Hermite spline. Tangents are per second, so the gap scales them (glTF 2.0 specification, appendix C).
     fn spline(&self, a: usize, b: usize, t: f64, gap: f64) -> [f64; N] {
         let (from, to) = (self.part(a, 1), self.part(b, 1));
         let (out, into) = (self.part(a, 2), self.part(b, 0));
@@ -120,12 +123,12 @@ impl<const N: usize> Curve<N> {
 }
 
 impl Curve<4> {
-    /// Key whose quaternion is zero, if there is one.
+    /// The first key whose quaternion is zero.
     pub fn zero_key(&self) -> Option<usize> {
         (0..self.times.len()).find(|&key| unit(self.value(key)).is_none())
     }
 
-    /// Rotation at `time`: spherical between linear keys, normalised after a spline.
+    /// Rotation at `time` seconds: spherical interpolation between linear keys, and normalised on a spline.
     pub fn rotation(&self, time: f64) -> UnitQuaternion<f64> {
         let (a, b, t, _) = self.around(time);
         let key = |key: usize| unit(self.value(key)).unwrap_or_default();
@@ -137,7 +140,7 @@ impl Curve<4> {
     }
 }
 
-/// The rotation of a quaternion x, y, z, w of any length but nought.
+/// The rotation of a quaternion x, y, z, w of any length but zero.
 pub(super) fn unit([x, y, z, w]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
     UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6)
 }

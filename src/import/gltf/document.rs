@@ -1,7 +1,7 @@
 //! The part of a glTF file's JSON that says how nodes move.
 //!
-//! Everything else (meshes, materials, textures) is left unread, so that faults there can't keep the motion from
-//! being imported. Its entries are those of [`gltf::json`], which checks their kinds but no index.
+//! Everything else (meshes, materials, textures) is left unread, so that faults there can't keep the motion from being
+//! imported. The entries are those of [`gltf::json`], which checks their types but not their indices.
 
 use super::error::GltfError;
 use gltf::json::animation::{Property, Sampler};
@@ -36,7 +36,8 @@ pub(super) struct Document {
     pub extensions: Option<Extensions>,
 }
 
-/// Most nodes, and most entries of other lists. Three bytes of JSON can make one, which takes hundreds of bytes here.
+/// Most nodes, and most entries of other lists. Chosen, as a bound on memory: three bytes of JSON can make an entry that takes
+/// hundreds of bytes here.
 const MOST_NODES: usize = 1 << 15;
 const MOST_ENTRIES: usize = 1 << 17;
 
@@ -70,7 +71,7 @@ impl<'de, T: Deserialize<'de>, const MOST: usize> Visitor<'de> for Bounded<T, MO
     }
 }
 
-/// An animation whose channels may lack a node, as those of extensions do; [`gltf::json::animation::Target`] wants one.
+/// An animation. Its channels may lack a node, as those of extensions do, which [`gltf::json::animation::Target`] refuses.
 #[derive(Deserialize)]
 pub(super) struct Animation {
     pub name: Option<String>,
@@ -92,7 +93,7 @@ pub(super) struct Target {
     pub path: Checked<Property>,
 }
 
-/// Names of the extensions of every node and buffer view, which [`gltf::json`] leaves out.
+/// Names of the extensions of every node and buffer view, which [`gltf::json`] drops.
 #[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
 struct Extended {
@@ -119,7 +120,7 @@ impl Document {
         names.is_some_and(|names| names.iter().any(|name| name == "KHR_lights_punctual"))
     }
 
-    /// The extension that this buffer view's bytes are packed with.
+    /// The extension that compresses this buffer view's bytes.
     pub fn packing(&self, view: usize) -> Option<&str> {
         let mut names = self.extended.buffer_views.get(view)?.iter();
         names
@@ -128,7 +129,7 @@ impl Document {
     }
 }
 
-/// A size or offset; those that can't be addressed fit nowhere.
+/// A size or offset. One too large for this machine fits nowhere.
 pub(super) fn size(bytes: USize64) -> usize {
     usize::try_from(bytes.0).unwrap_or(usize::MAX)
 }
@@ -218,7 +219,7 @@ struct Asset {
     version: String,
 }
 
-/// Reads the JSON, whose version is looked at first: glTF 1 has another layout.
+/// Reads the JSON. The version is checked first, because glTF 1 has another layout.
 pub(super) fn parse(json: &[u8]) -> Result<Document, GltfError> {
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     let broken = |e: serde_json::Error| GltfError::Json {
@@ -242,7 +243,7 @@ pub(super) fn parse(json: &[u8]) -> Result<Document, GltfError> {
     })
 }
 
-/// The same with nothing in any `extras`, which may be anything, but which [`gltf::json`] wants to be objects.
+/// The same JSON with every `extras` emptied: by the specification it may be anything, but [`gltf::json`] wants an object.
 fn without_extras(json: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(json.len() + json.len() / 8);
     let mut at = 0;
@@ -272,7 +273,7 @@ fn token_end(json: &[u8], at: usize) -> usize {
     end.min(json.len())
 }
 
-/// Where the value that begins at `at` has ended: at the comma or bracket after it.
+/// Where the value that begins at `at` ends: at the comma or bracket after it.
 fn value_end(json: &[u8], mut at: usize) -> usize {
     let mut depth = 0_usize;
     while let Some(byte) = json.get(at) {

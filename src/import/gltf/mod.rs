@@ -23,7 +23,7 @@ use std::path::Path;
 use take::Curves;
 use tree::{Rest, Tree};
 
-/// Required extensions that change neither the nodes nor their motion.
+/// Starts of the names of required extensions that change neither the nodes nor their motion.
 const HARMLESS: [&str; 4] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -34,7 +34,7 @@ const HARMLESS: [&str; 4] = [
 /// A glTF file's nodes and animations.
 pub(crate) struct GltfScene {
     contents: Contents,
-    /// How the nodes stand in their parents.
+    /// The transforms of the nodes in their parents.
     rest: Vec<Rest>,
     /// One per take.
     curves: Vec<Curves>,
@@ -46,7 +46,7 @@ pub(crate) fn read_glb(bytes: &[u8], folder: Option<&Path>) -> Result<GltfScene,
     scene(&document::parse(&glb.json)?, glb.bin.as_deref(), folder)
 }
 
-/// Reads a `.gltf` file. Buffers in other files are looked for in `folder`, and nowhere else.
+/// Reads a `.gltf` file. Buffers in other files are looked for in `folder` and nowhere else.
 pub(crate) fn read_json(bytes: &[u8], folder: Option<&Path>) -> Result<GltfScene, GltfError> {
     scene(&document::parse(bytes)?, None, folder)
 }
@@ -93,6 +93,7 @@ fn scene(
     })
 }
 
+/// Notes about required extensions that aren't known, and a VRM extension that can't be read.
 fn extension_problems(document: &Document) -> Vec<Problem> {
     let unknown = |name: &&String| !HARMLESS.iter().any(|harmless| name.starts_with(harmless));
     let problem = |name: &String| {

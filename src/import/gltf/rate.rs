@@ -1,21 +1,23 @@
-//! The frame rate that a glTF animation was made at, which the format doesn't say.
+//! The frame rate of a glTF animation, which the format doesn't state: that of its keys.
 
 use std::collections::BTreeMap;
 
 /// Rates that animations are made at, in Hz.
 const USUAL: [f64; 7] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0];
-/// A rate this near to a usual one, relative to it, is meant to be that one.
+/// A rate within this fraction of a usual one is meant to be that one. Chosen: it takes 29.97 for 30.
 const NEAR: f64 = 0.01;
-/// Where the keys say nothing, or stand farther apart than frames do.
+/// Rate of takes whose keys say nothing, Hz. Chosen.
 const DEFAULT: f64 = 30.0;
+/// Lowest and highest rate that keys can say, Hz. Chosen: keys that are farther apart are poses set by hand, and keys that are
+/// nearer are rounding.
 const SLOWEST: f64 = 10.0;
 const FASTEST: f64 = 1000.0;
-/// Spacings are told apart to this many seconds; key times are rounded to 32 bits.
+/// Spacings within this many seconds of each other count as equal. Chosen above the rounding of key times to 32 bits.
 const RESOLUTION: f64 = 1e-4;
 
-/// Frame rate in Hz by the most common spacing of the keys.
+/// Frame rate, Hz, by the most common spacing of the keys. `curves` are the key times of every curve, seconds.
 pub(super) fn rate<'a>(curves: impl Iterator<Item = &'a [f64]>) -> f64 {
-    // Number and sum of the spacings that are alike.
+    // Number and sum of equal spacings.
     let mut spacings: BTreeMap<u64, (usize, f64)> = BTreeMap::new();
     for times in curves {
         for pair in times.windows(2) {
@@ -28,7 +30,7 @@ pub(super) fn rate<'a>(curves: impl Iterator<Item = &'a [f64]>) -> f64 {
             }
         }
     }
-    // The shortest of equally common ones comes first.
+    // Of equally common spacings the shortest wins: it comes first.
     let most = spacings.values().fold(
         (0, 1.0),
         |most, alike| if alike.0 > most.0 { *alike } else { most },

@@ -23,7 +23,7 @@ struct NodeCurves {
     scale: Option<Curve<3>>,
 }
 
-/// What moves the nodes of a take, by their place in the tree.
+/// What moves the nodes of a take, by their index in the tree.
 #[derive(Default)]
 pub(super) struct Curves {
     nodes: BTreeMap<usize, NodeCurves>,
@@ -40,7 +40,7 @@ impl NodeCurves {
 }
 
 impl Curves {
-    /// What `node`, which stands at `rest`, does at `time`; `None` if nothing moves it.
+    /// The transform of `node` in its parent at `time` seconds: at `rest` as far as no curve drives it. `None` if none does.
     pub fn placement(&self, node: usize, rest: &Placement, time: f64) -> Option<Placement> {
         let curves = self.nodes.get(&node)?;
         let vector = |curve: &Option<Curve<3>>, rest: Vector3<f64>| {
@@ -86,8 +86,8 @@ impl Curves {
     }
 }
 
-/// Reads an animation: its curves and what is to be said of it. One that is broken moves nothing and says why, so that
-/// the others can be used.
+/// Reads an animation: its curves, and the take that tells about it. A broken one moves nothing and says why, so that the others
+/// can be used.
 pub(super) fn read(
     animation: &Animation,
     name: String,
@@ -120,7 +120,7 @@ fn in_take(error: &GltfError, take: &str) -> Explanation {
     }
 }
 
-/// Reads the curves of an animation. What can't move a joint (morph weights, pointers) is passed over.
+/// Reads the curves of an animation. What can't move a joint (morph weights, pointers) is skipped.
 fn curves(
     animation: &Animation,
     take: &str,
@@ -164,12 +164,12 @@ fn curves(
         }
         let of_node = curves.nodes.entry(place).or_default();
         let first = match path {
-            "translation" => keep(
+            "translation" => fill(
                 &mut of_node.translation,
                 vectors(sampler, accessors, &broken)?,
             ),
-            "scale" => keep(&mut of_node.scale, vectors(sampler, accessors, &broken)?),
-            _ => keep(
+            "scale" => fill(&mut of_node.scale, vectors(sampler, accessors, &broken)?),
+            _ => fill(
                 &mut of_node.rotation,
                 rotations(sampler, accessors, &broken)?,
             ),
@@ -181,8 +181,8 @@ fn curves(
     Ok(curves)
 }
 
-/// Fills an empty place; false where it was taken.
-fn keep<T>(place: &mut Option<T>, value: T) -> bool {
+/// Fills an empty slot; false if it was full.
+fn fill<T>(place: &mut Option<T>, value: T) -> bool {
     let empty = place.is_none();
     place.get_or_insert(value);
     empty
@@ -220,7 +220,7 @@ fn interpolation(sampler: &Sampler) -> Result<Interpolation, String> {
     }
 }
 
-/// Curves of `KHR_animation_pointer`, whose targets are no nodes.
+/// A note about curves of `KHR_animation_pointer`, whose targets aren't nodes.
 fn pointers(animation: &Animation, take: &str) -> Option<Problem> {
     let channels = animation.channels.iter();
     let count = channels
@@ -236,7 +236,7 @@ fn pointers(animation: &Animation, take: &str) -> Option<Problem> {
     })
 }
 
-/// A curve that isn't used.
+/// A warning about a curve that isn't used.
 fn problem(id: &str, take: &str, node: &str, path: &str) -> Problem {
     let message = format!("take `{take}` has a curve for the {path} of `{node}` that isn't used");
     Problem::warning(id, message)

@@ -1,4 +1,4 @@
-//! The node tree, parents before children, and how each node stands in its parent.
+//! The node tree, parents before children, and the transform of each node in its parent.
 
 use super::curve::unit;
 use super::document::{Document, Extensions};
@@ -20,7 +20,7 @@ pub(super) struct Placement {
 /// A node's own transform. A matrix may hold shear, which the three parts can't.
 pub(super) struct Rest {
     pub placement: Placement,
-    /// Rare, and large.
+    /// Boxed, because it is rare and large.
     matrix: Option<Box<Matrix4<f64>>>,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Rest {
 pub(super) struct Tree {
     pub nodes: Vec<scene::Node>,
     pub rest: Vec<Rest>,
-    /// Place in `nodes` of every node of the file.
+    /// Index in `nodes` of every node of the file.
     pub place: Vec<usize>,
 }
 
@@ -75,7 +75,7 @@ impl Rest {
     }
 }
 
-/// The parts of a matrix, for nodes that are animated against the specification.
+/// Translation, rotation and scale of a matrix. The specification forbids to animate nodes with a matrix, but files do.
 fn parts(matrix: &Matrix4<f64>) -> Placement {
     let linear = matrix.fixed_view::<3, 3>(0, 0).into_owned();
     let turn = rotation_of(&linear).unwrap_or_else(Rotation3::identity);
@@ -87,7 +87,7 @@ fn parts(matrix: &Matrix4<f64>) -> Placement {
     }
 }
 
-/// Orders the nodes, after finding that they form trees.
+/// Orders the nodes, and checks that they form trees.
 pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
     let parents = parents(document)?;
     let order = order(document, &parents)?;
@@ -128,7 +128,8 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
     Ok(Tree { nodes, rest, place })
 }
 
-/// Nodes that an extension says to be bones, and which, each once; nothing where it doesn't say which.
+/// Nodes that an extension calls bones, and which bone each is, or nothing if the extension doesn't say. Each node and each bone
+/// counts once.
 fn told(document: &Document) -> BTreeMap<usize, &str> {
     let (mut told, mut names) = (BTreeMap::new(), BTreeSet::new());
     let bones = document.extensions.iter().flat_map(Extensions::bones);
