@@ -1,4 +1,5 @@
-//! Small files made to cost much, and damaged copies of our own clips. `fuzz` has damage to real files of every format.
+//! Small files made to cost much time or memory, and damaged copies of our own clips. The test `fuzz` damages real files of
+//! every format.
 
 #[path = "import/damage.rs"]
 mod damage;
@@ -17,12 +18,12 @@ const CONSTANT: usize = 256 << 10;
 const PER_TRANSFORM: usize = 120;
 /// Transforms that any file may be sampled to.
 const FREE_TRANSFORMS: usize = 1 << 18;
-/// Bytes that any file may take, whatever is in it: for lists as long as they may be, of the shortest entries.
+/// Bytes of memory that reading any file may take, whatever is in it: for the longest lists allowed, of the shortest entries.
 const FREE: usize = 32 << 20;
 const ROUNDS: usize = 2000;
 const SOON: Duration = Duration::from_secs(10);
 
-/// A still in which every frame lasts `seconds`.
+/// A DeepMimic motion that stands still, in which every frame lasts `seconds`.
 fn deepmimic(seconds: &str) -> Vec<u8> {
     let pose = ["1.0", "0.0", "0.0", "0.0"];
     let numbers: Vec<&str> = [seconds, "0.0", "0.9", "0.0"]
@@ -37,7 +38,7 @@ fn deepmimic(seconds: &str) -> Vec<u8> {
     .into_bytes()
 }
 
-/// Looks at `bytes` in a file and checks what that cost, and that what is told of takes can be meant.
+/// Inspects `bytes` in a file, and checks what that cost and that what it says about takes is possible.
 fn inspected(name: &str, bytes: &[u8]) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("file");
@@ -60,7 +61,7 @@ fn inspected(name: &str, bytes: &[u8]) {
     }
 }
 
-/// Reads `bytes` and checks what that cost; whether they could be read.
+/// Reads `bytes` and checks what that cost, by their size. Returns how many transforms the clip has.
 fn frugal(name: &str, bytes: &[u8]) -> Result<usize, Error> {
     inspected(name, bytes);
     let start = Instant::now();
@@ -77,14 +78,14 @@ fn frugal(name: &str, bytes: &[u8]) -> Result<usize, Error> {
     clip.map(|_| transforms)
 }
 
-/// Reads `bytes` that may take what any file may.
+/// Reads `bytes`, which may take as much memory as any file may.
 fn bearable(name: &str, bytes: &[u8]) -> Result<Clip, Error> {
     let (clip, peak) = heap::peak_of(|| import::read(bytes, name, None, &Options::default()));
     assert!(peak < FREE + PER_BYTE * bytes.len(), "{name}: {peak} bytes");
     clip
 }
 
-/// Reads damaged copies of `bytes`; how many of them could be read still.
+/// Reads damaged copies of `bytes`, and returns how many of them could still be read.
 fn survived(name: &str, bytes: &[u8]) -> usize {
     let mut damage = Damage::new();
     let damaged = |round| {
@@ -95,7 +96,7 @@ fn survived(name: &str, bytes: &[u8]) -> usize {
     (0..ROUNDS).map(damaged).filter(|read| *read).count()
 }
 
-/// Many animations of many nodes: comparing them all would take their product.
+/// Many animations of many nodes: comparing all of them would cost their product.
 fn many_takes() -> Vec<u8> {
     let channel = r#"{"sampler":0,"target":{"node":0,"path":"translation"}}"#;
     let take = format!(r#"{{"channels":[{channel}],"samplers":[{{"input":0,"output":1}}]}}"#);
@@ -157,7 +158,7 @@ fn long_take(seconds: f32) -> Vec<u8> {
     file.replace("data:;base64,AAAAAAAAyEc=", &key).into_bytes()
 }
 
-/// A bone that moves for 28 hours among many meshes: its frames are few enough to keep, but all nodes have to be placed.
+/// A bone that moves for 28 hours among many meshes: its frames are few enough to keep, but every node has to be placed in each.
 fn long_take_of_many_meshes() -> Vec<u8> {
     assert_eq!(102_400_f32.to_le_bytes(), [0, 0, 200, 71]);
     let take = r#"{"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}],"samplers":[{"input":0,"output":1}]}"#;

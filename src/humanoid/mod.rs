@@ -9,7 +9,7 @@ mod limbs;
 mod names;
 mod shape;
 mod sides;
-mod told;
+mod stated;
 mod tree;
 mod trunk;
 
@@ -187,12 +187,12 @@ impl HumanoidMap {
 /// written by hand can start from them.
 pub fn partial(joints: &[Joint]) -> HumanoidMap {
     let tree = tree::Tree::new(joints);
-    let mut found = told::find(joints);
+    let mut found = stated::find(joints);
     let guessed = guesses(&tree, joints);
     if found.matches.is_empty() {
         return guessed;
     }
-    told::supplement(&tree, &mut found, guessed);
+    stated::supplement(&tree, &mut found, guessed);
     found
 }
 

@@ -1,5 +1,5 @@
-//! Damage inside of binary FBX files: records, values and arrays are changed and written anew, and then perhaps one of
-//! the numbers that tell their lengths.
+//! Damage inside binary FBX files: records, values and arrays are changed and written again, and then perhaps one of the numbers
+//! that state their lengths.
 
 use super::random::Random;
 use miniz_oxide::inflate::decompress_to_vec_zlib;
@@ -297,7 +297,7 @@ impl Written {
         }
     }
 
-    /// Puts a wrong number where a length or a count is told.
+    /// Puts a wrong number in place of a length or a count.
     fn damage(&mut self, random: &mut Random) {
         let (at, width) = *random.of(&self.lengths);
         let near = self.bytes[at].wrapping_add(random.below(5) as u8);

@@ -1,4 +1,4 @@
-//! Damage inside of GLB files whose chunks stay whole, so that it gets behind the container.
+//! Damage inside the chunks of GLB files, which stay whole themselves: so the damage gets past the reader of the container.
 
 use super::json;
 use super::random::Random;

@@ -1,4 +1,4 @@
-//! An allocator that counts, for each thread, the bytes in use and the most there were.
+//! An allocator that counts, for each thread, the bytes in use and their maximum.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -8,8 +8,8 @@ thread_local! {
     static PEAK: Cell<isize> = const { Cell::new(0) };
 }
 
-/// The system's allocator with counts. What is freed by another thread than took it upsets them, so what is measured
-/// stays on its thread.
+/// The system's allocator with counts. Memory that another thread frees makes them wrong, so what is measured stays on its
+/// thread.
 struct Counting;
 
 #[global_allocator]

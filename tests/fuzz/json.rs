@@ -39,7 +39,7 @@ fn children(value: &Value) -> usize {
     }
 }
 
-/// A value somewhere below, reached by equal steps, so that long lists don't take all the damage.
+/// A value somewhere below. Each step down chooses among the entries alike, so that long lists don't get all the damage.
 fn pick<'a>(mut value: &'a Value, random: &mut Random) -> &'a Value {
     while children(value) > 0 && !random.one_in(12) {
         let at = random.below(children(value));
@@ -126,7 +126,7 @@ fn nudge(value: &mut Value, random: &mut Random) {
     };
 }
 
-/// An entry lost, doubled, moved or put in.
+/// Removes, doubles, moves or adds an entry.
 fn reshape(value: &mut Value, other: Value, random: &mut Random) {
     let at = random.below(children(value));
     match value {

@@ -1,7 +1,7 @@
 //! Damaged copies of real files: reading them never panics, ends soon, and takes no more memory than their size allows.
 //!
-//! `MIMIC_FUZZ_INPUTS`, `MIMIC_FUZZ_SEED` and `MIMIC_FUZZ_FIRST` say how many copies, of which seed, and from which number
-//! on `many_inputs` reads; those that fail are kept in `MIMIC_FUZZ_FOLDER`.
+//! `many_inputs` reads as many copies as `MIMIC_FUZZ_INPUTS` says, of the seed `MIMIC_FUZZ_SEED`, from number `MIMIC_FUZZ_FIRST`
+//! on. Those that fail are kept in `MIMIC_FUZZ_FOLDER`.
 
 mod fbx;
 mod glb;
@@ -21,14 +21,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// Bytes that reading may take for each byte that is read, and for any file: a few bytes can ask for many frames, and
-/// tables of a reader have their size whatever is in the file.
+/// Bytes that reading may take for each byte of the file, and for any file: a few bytes can ask for many frames, and a reader's
+/// tables have the same size for every file.
 const PER_BYTE: usize = 64;
 const FREE: usize = 32 << 20;
 const SOON: Duration = Duration::from_secs(1);
-/// What takes this long doesn't end.
+/// A reading that takes this long counts as endless.
 const NEVER: u64 = 120;
-/// Failures after which there is no use in going on.
+/// Failures after which a run stops.
 const ENOUGH: usize = 100;
 
 /// What was seen of one format.
@@ -47,9 +47,9 @@ struct Run {
     seeds: Vec<Seed>,
     kinds: Vec<&'static str>,
     seed: u64,
-    /// A motion by way of which skeletons are read.
+    /// A motion, beside which damaged skeletons are put.
     motion: Vec<u8>,
-    /// For files that have to lie on a disk.
+    /// For files that have to be on a disk.
     folder: tempfile::TempDir,
     kept: PathBuf,
     tallies: BTreeMap<&'static str, Tally>,
@@ -195,7 +195,7 @@ impl Run {
     }
 }
 
-/// How long this thread has been on a processor, where the system tells.
+/// How long this thread has run on a processor, if the system tells.
 fn on_processor() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(Duration::from_nanos(text.split(' ').next()?.parse().ok()?))

@@ -1,4 +1,4 @@
-//! The files that are damaged: our own clips, and small ones of others where they are at hand.
+//! The files that are damaged: our own clips, and small files of others where they are at hand.
 
 use super::fbx::Fbx;
 use super::glb::Glb;
@@ -77,7 +77,7 @@ const THEIRS: [(&str, &str); 47] = [
     ("DeepMimic", "deepmimic/dog3d_trot.txt"),
 ];
 
-/// Bytes of a long motion that are used: its first lines.
+/// How many bytes of a long motion are used: its first lines.
 const AMC_BYTES: usize = 20_000;
 
 /// What is known of a file's structure.

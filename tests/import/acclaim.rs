@@ -1,5 +1,5 @@
-//! ASF and AMC files against a direct evaluation of Acclaim's formula in plain matrices, and against a BVH file that
-//! others made of the same take.
+//! ASF and AMC files compared with a direct evaluation of Acclaim's formula in plain matrices, and with a BVH file that others
+//! made from the same take.
 
 use super::acclaim_reference::{asf, places};
 use super::bvh::{Place, agrees, evaluate};
@@ -41,8 +41,8 @@ fn every_joint_of_every_frame_follows_the_formula() {
     checked(&text(&skeleton), &text(&amc), &clip, CMU, "01_01.amc");
 }
 
-/// The BVH of this take begins one frame earlier, in the rest pose, and leaves out the lengths of the two kinds of bone
-/// that branch, the thorax and the wrists: what hangs on them begins where they begin. But for that all places agree.
+/// The BVH of this take begins one frame earlier, in the rest pose. It also leaves out the lengths of the bones that branch, the
+/// thorax and the wrists: their children begin where they begin. All other positions agree.
 #[test]
 fn the_same_take_as_bvh_has_the_same_places() {
     let (Some(amc), Some(skeleton), Some(bvh)) = (
@@ -98,7 +98,7 @@ fn the_same_take_as_bvh_has_the_same_places() {
     assert!(worst < 1e-4, "{worst} m");
 }
 
-/// What the BVH's joints are called in the ASF.
+/// The ASF's names of the BVH's joints.
 fn acclaim_name(bvh: &str) -> String {
     let (bvh, end) = match bvh.strip_suffix("_end") {
         Some(bvh) => (bvh, "_end"),
@@ -183,8 +183,8 @@ fn the_skeleton_alone_has_joints_and_no_motion() {
     );
 }
 
-/// Few programs write all of this: radians, orders of their own, a root that stands elsewhere, a bone that slides, one
-/// that nothing moves, and a bone that stands before its parent.
+/// A skeleton with everything that few programs write: radians, unusual orders of axes, a root away from the origin, a bone that
+/// slides, one without degrees of freedom, and one that comes before its parent.
 const SKELETON: &str = "# made\r\n:version 1.10\n:name made\n:units\n  mass 1.0\n  length 0.9\n  angle rad\n:root\n  order RZ RX RY TX TY TZ\n  axis ZYX\n  position 1 2 3\n  orientation 0.1 0.2 0.3\n:bonedata\n\
     begin\n id 2\n name arm\n direction 0.6 0.8 0\n length 20\n axis 0.3 -0.4 0.5 YZX\n dof tx ry rx tz\n limits (-inf inf)\n (-1 1)\n (-2 2)\n (0 1)\n end\n\
     begin\n id 1\n name trunk\n direction 0 1 0\n length 30\n axis 0 1.1 0 XYZ\n dof rx\n end\n\

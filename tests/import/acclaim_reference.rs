@@ -1,5 +1,5 @@
-//! Acclaim's formula, straight from its description, in plain matrices: L = C · M · C⁻¹, at the end of the parent's
-//! direction × length.
+//! Acclaim's formula, straight from its description, in plain matrices: a bone's rotation is L = C · M · C⁻¹, and it begins at
+//! its parent's direction × length.
 
 use super::bvh::{Matrix, Place, about, times};
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ fn axis(letter: char) -> usize {
     "xyz".find(letter.to_ascii_lowercase()).expect("x, y, or z")
 }
 
-/// Rotations about the axes that `order` names, the first done first.
+/// Rotations about the axes that `order` names, the first applied first.
 fn euler(order: &str, degrees: impl Fn(usize) -> f64) -> Matrix {
     order.chars().fold(about(0, 0.0), |turn, letter| {
         times(&about(axis(letter), degrees(axis(letter))), &turn)
@@ -30,7 +30,7 @@ fn euler(order: &str, degrees: impl Fn(usize) -> f64) -> Matrix {
 #[derive(Clone, Default)]
 struct Bone {
     parent: String,
-    /// Where it ends from where it begins: direction × length.
+    /// From its start to its end: direction × length.
     along: Place,
     c: Matrix,
     dof: Vec<String>,
@@ -96,8 +96,8 @@ pub(super) fn asf(text: &str) -> Asf {
     asf
 }
 
-/// Where every bone begins, and, under its name and `_end`, where it ends, in each frame. Parents must stand first in
-/// the hierarchy.
+/// Where every bone begins and, under its name with `_end`, where it ends, in each frame. Parents must come first in the
+/// hierarchy.
 pub(super) fn places(asf: &Asf, amc: &str) -> Vec<BTreeMap<String, Place>> {
     let unit = degrees_of(amc, ":RADIANS");
     let mut frames: Vec<BTreeMap<&str, Vec<f64>>> = Vec::new();

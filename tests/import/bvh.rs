@@ -1,4 +1,4 @@
-//! BVH files against a direct evaluation of the format, in plain matrices, and files made to be awkward.
+//! BVH files compared with a direct evaluation of the format in plain matrices, and files made to be awkward.
 
 use mimic::clip::Clip;
 use mimic::import::{self, Options};
@@ -28,7 +28,7 @@ struct Joint {
     channels: Vec<String>,
 }
 
-/// World places of all joints and end sites, frame after frame, in the file's axes and units.
+/// World positions of all joints and end sites, frame by frame, in the file's axes and units.
 pub(super) fn evaluate(text: &str) -> Vec<Vec<Place>> {
     let (tree, motion) = text.split_once("MOTION").expect("a motion");
     let words: Vec<&str> = tree.split_whitespace().collect();
@@ -92,7 +92,7 @@ pub(super) fn evaluate(text: &str) -> Vec<Vec<Place>> {
     .collect()
 }
 
-/// Forward, left and up of a place in a file's axes, before the figure is turned to face forward.
+/// A position in a file's axes as forward, left and up, before the figure is turned to face forward.
 fn upright(place: &Place, up: char) -> Place {
     let [x, y, z] = *place;
     match up {
@@ -101,7 +101,7 @@ fn upright(place: &Place, up: char) -> Place {
     }
 }
 
-/// The clip has the file's places, but for one turn about the vertical and the unit.
+/// Checks that the clip has the file's positions, up to the unit and one turn about the vertical.
 pub(super) fn agrees(clip: &Clip, expected: &[Vec<Place>], up: char, unit: f64, what: &str) {
     assert_eq!(clip.frames.len(), expected.len(), "{what}");
     let pairs: Vec<(Place, Place)> = (0..expected.len())
@@ -171,7 +171,7 @@ fn rates_are_those_that_the_frame_times_stand_for() {
     }
 }
 
-/// The recording of subject 1 has as many frames in its own format, which has no pose before them.
+/// The same recording in its own format has as many frames, without a pose before them.
 #[test]
 fn a_pose_before_the_motion_is_left_out_unless_it_is_asked_for() {
     let Some(path) = foreign("cmu/01_01.bvh") else {
@@ -196,8 +196,8 @@ fn a_pose_before_the_motion_is_left_out_unless_it_is_asked_for() {
     assert_eq!(frames(Some((0.0, f64::INFINITY))), (recorded + 1, false));
 }
 
-/// Two joints, as few programs would write them: no end site, places on a joint, an exponent, a decimal comma, an
-/// order of its own, two words for a name, and a header that counts three frames.
+/// Two joints as few programs write them: no end site, position channels on a joint, an exponent, a decimal comma, an unusual
+/// order of channels, a name of two words, and a header that counts three frames.
 const AWKWARD: &str = "hierarchy\r\nRoot Hip Joint {\r\n offset 0 1e0 0\r\n channels 6 Yposition Xposition Zposition \
     Zrotation Xrotation Yrotation\r\n joint Tip\r\n {\r\n OFFSET 0 .5 0\r\n CHANNELS 4 xrotation Xposition Yposition \
     ZPOSITION\r\n }\r\n}\r\nMotion\r\nFrames: 3\r\nFrame Time: 0,04\r\n1 2 3 90 0 0 0 0 0,5 0\r\n\

@@ -1,4 +1,4 @@
-//! DeepMimic motions against a direct evaluation of the format's formulas, in its own axes (Y up, X forward).
+//! DeepMimic motions compared with a direct evaluation of the format's formulas, in its own axes (Y up, X forward).
 
 use mimic::clip::LoopMode;
 use mimic::import::{self, Options};

@@ -1,5 +1,5 @@
-//! ASCII, big-endian and old FBX files: those of others against an evaluation of whole scenes by ufbx, and our own clip
-//! in other forms against itself.
+//! ASCII, big-endian and old FBX files: those of others compared with whole scenes that ufbx evaluates, and our own clip in other
+//! forms compared with itself.
 
 use super::damage::Damage;
 use super::fbx_rewritten::{Value, as_ascii, as_big_endian, node, records};
@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 
 const TOLERANCE_M: f64 = 1e-4;
 
-/// Front, left and up of the file as ufbx has them, as rows: canonical from file. The axis on a viewer's right is on the
-/// left of the character in front of him.
+/// Front, left and up of the file by ufbx, as rows: canonical from file. What is right for a viewer is left for the character
+/// facing him.
 fn canonical(oracle: &ufbx::Scene) -> Matrix3<f64> {
     use ufbx::CoordinateAxis::*;
     let row = |axis: &ufbx::CoordinateAxis, otherwise: Vector3<f64>| match axis {
@@ -78,8 +78,8 @@ fn heading(pairs: &[(Vector3<f64>, &Vec<Vector3<f64>>)]) -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::z_axis(), cross.atan2(dot))
 }
 
-/// Largest distance in metres between a clip's joints, at every frame, and ufbx's nodes, but for a turn about the up
-/// axis if the clip says that it was turned.
+/// Largest distance between a clip's joints and ufbx's nodes in any frame, metres, up to a turn about the up axis if the clip
+/// says that it was turned.
 fn farthest(clip: &Clip, oracle: &ufbx::Scene, index: usize) -> f64 {
     let mut paths: Vec<String> = Vec::new();
     for joint in &clip.joints {
@@ -104,7 +104,7 @@ fn farthest(clip: &Clip, oracle: &ufbx::Scene, index: usize) -> f64 {
     worst
 }
 
-/// Compares all takes of a file; how many frames these have.
+/// Compares all takes of a file, and returns how many frames they have.
 fn check(file: &str) -> usize {
     let Some(at) = foreign(&format!("torture-fbx/{file}.fbx")) else {
         return 0;
@@ -250,7 +250,7 @@ fn lengths_and_depths_of_the_file_are_not_believed() {
     assert!(said.contains("memory"), "{said}");
 }
 
-/// Every layer is asked about every node: 20,000 of each, in two takes, would take their product.
+/// ufbx looks up every node in every layer: 20,000 of each, in two takes, would cost their product.
 #[test]
 fn takes_of_implausibly_many_layers_are_refused() {
     let many = 20_000;

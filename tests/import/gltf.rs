@@ -1,4 +1,4 @@
-//! Real glTF files against an evaluation that shares no code with the importer.
+//! Real glTF files compared with an evaluation that shares no code with the importer.
 
 use super::gltf_reference::Reference;
 use mimic::clip::{Clip, LoopMode};
@@ -15,7 +15,7 @@ fn load(path: &Path, take: &str) -> Clip {
     import::load(path, &options).expect("it imports")
 }
 
-/// Farthest that a joint is from its place by `reference`, metres. No node that the take moves may be missing.
+/// Largest distance of a joint from its position by `reference`, metres. No node that the take moves may be missing.
 ///
 /// X, Y, Z are the file's z, x, y, X and Y with sign `facing`: −1 for a character that was turned by half.
 fn farthest(clip: &Clip, reference: &Reference, take: &str, facing: f64) -> f64 {

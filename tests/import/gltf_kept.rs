@@ -1,4 +1,4 @@
-//! What is kept of a glTF file, and what is told of the rest.
+//! What the importer keeps of a glTF file, and which notes it makes about the rest.
 
 use super::gltf_made::{base64, synthetic};
 use mimic::clip::Clip;
@@ -24,7 +24,7 @@ fn list<'a>(file: &'a mut Value, key: &str) -> &'a mut Vec<Value> {
     file[key].as_array_mut().expect("a list")
 }
 
-/// Adds an accessor with these numbers; its index.
+/// Adds an accessor with these numbers, and returns its index.
 fn numbers(file: &mut Value, kind: &str, width: usize, numbers: &[f32]) -> usize {
     let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
     let uri = format!("data:;base64,{}", base64(&bytes));

@@ -1,11 +1,11 @@
-//! glTF files made for one trait each, the values worked out by hand.
+//! Small glTF files, each made to show one thing, with expected values worked out by hand.
 
 use mimic::clip::{Clip, LoopMode};
 use mimic::import::{self, Options};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-/// A two-joint file, in text, whose take is as `change` leaves it.
+/// A file with two joints and one take, as text, after `change`.
 pub fn synthetic(change: impl Fn(&mut Value)) -> String {
     // Times 0, 1 and two turns: none, and a quarter about z.
     let half = std::f32::consts::FRAC_1_SQRT_2;

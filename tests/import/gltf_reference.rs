@@ -1,4 +1,4 @@
-//! An evaluation of glTF animations straight from JSON and bytes, with plain 4 × 4 matrices (Y up, facing +Z).
+//! Evaluates glTF animations straight from JSON and bytes, with plain 4 × 4 matrices (Y up, facing +Z).
 
 use serde_json::Value;
 use std::path::Path;
@@ -91,7 +91,7 @@ impl Reference {
         )
     }
 
-    /// Nodes that a take moves, but for meshes that carry no other nodes.
+    /// Nodes that a take moves, without meshes that have no nodes below them.
     pub fn moved(&self, take: &Value) -> Vec<usize> {
         let moves = |channel: &&Value| channel["target"]["path"] != "weights";
         let channels = take["channels"].as_array().expect("channels").iter();

@@ -1,8 +1,7 @@
-//! Importers against evaluations of the formats' own formulas that share no code with them.
+//! Importers compared with evaluations of the formats' own formulas, which share no code with them.
 
 mod acclaim;
 mod acclaim_reference;
-mod beside;
 mod bvh;
 mod damage;
 mod deepmimic;
@@ -13,9 +12,10 @@ mod fbx_rewritten;
 #[cfg(feature = "ufbx")]
 mod formats;
 mod gltf;
+mod gltf_faults;
 mod gltf_kept;
 mod gltf_made;
 mod gltf_reference;
 mod maps;
 mod robust;
-mod told;
+mod vrm;

@@ -1,4 +1,4 @@
-//! Every humanoid rig maps by itself, as it was read off its file by hand (`maps.txt`).
+//! Every humanoid rig is mapped without help, as somebody mapped it by hand (`maps.txt`).
 
 use mimic::humanoid::{self, Slot};
 use mimic::import;

@@ -1,10 +1,10 @@
-//! Files that were cut, overwritten or flipped never bring the importer down.
+//! Files that were cut off, overwritten or had bits flipped never make the importer panic.
 
 use super::damage::Damage;
 use mimic::import::{self, Options};
 use mimic_test_support::foreign;
 
-/// Damages `bytes` many times; reading may fail but must return, and what is returned must be whole.
+/// Damages `bytes` many times. Reading may fail, but must return, and a clip that it returns must be whole.
 fn survives(name: &str, bytes: &[u8], rounds: usize) {
     let mut damage = Damage::new();
     let mut refused = 0;

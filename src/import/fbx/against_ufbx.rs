@@ -1,4 +1,4 @@
-//! Every node of every frame of every take of real files, against `ufbx`.
+//! Every node in every frame of every take of real files, compared with `ufbx`.
 
 use super::rewritten::as_binary;
 use super::{FbxError, FbxScene, read};
@@ -203,7 +203,7 @@ fn check(file: &str) {
     );
 }
 
-/// Its span of 92 hours isn't sampled frame by frame.
+/// Its take of 92 hours isn't sampled frame by frame.
 #[test]
 fn torture_maya_long_keyframes() {
     let file = "torture-fbx/maya_long_keyframes_7700_binary.fbx";

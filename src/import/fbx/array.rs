@@ -1,11 +1,11 @@
-//! Arrays of the file, decoded only when asked for and within a budget.
+//! Arrays of the file, decoded only when needed and within a budget.
 
 use super::numbers::{double_word, word};
 use miniz_oxide::inflate::{TINFLStatus, decompress_slice_iter_to_slice};
 use std::borrow::Cow;
 use std::iter::once;
 
-/// No DEFLATE stream expands more than this: 258 bytes out of two bits.
+/// No DEFLATE stream expands by more than this factor: at best two bits stand for 258 bytes (RFC 1951).
 const MAX_EXPANSION: usize = 1032;
 
 /// Type of an array's values.
@@ -21,13 +21,18 @@ pub(super) enum Kind {
 /// An array value, still encoded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Array<'a> {
+    /// Type of its values.
     pub kind: Kind,
+    /// Whether `data` is a zlib stream.
     pub compressed: bool,
+    /// How many values it claims to have.
     pub count: usize,
+    /// Its bytes in the file.
     pub data: &'a [u8],
 }
 
 impl<'a> Array<'a> {
+    /// Bytes per value.
     fn width(&self) -> usize {
         match self.kind {
             Kind::I64 | Kind::F64 => 8,
@@ -36,6 +41,7 @@ impl<'a> Array<'a> {
         }
     }
 
+    /// The decoded bytes, of which `budget` has enough.
     fn bytes(&self, budget: &mut usize) -> Result<Cow<'a, [u8]>, &'static str> {
         let len = self.width().saturating_mul(self.count);
         *budget = budget
@@ -50,7 +56,7 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// The array's values as reals.
+    /// The values of an array of reals.
     pub fn reals(&self, budget: &mut usize) -> Result<Vec<f64>, &'static str> {
         let bytes = self.bytes(budget)?;
         let chunks = bytes.chunks_exact(self.width());
@@ -61,7 +67,7 @@ impl<'a> Array<'a> {
         })
     }
 
-    /// The array's values as integers.
+    /// The values of an array of integers.
     pub fn integers(&self, budget: &mut usize) -> Result<Vec<i64>, &'static str> {
         let bytes = self.bytes(budget)?;
         let chunks = bytes.chunks_exact(self.width());
@@ -72,7 +78,7 @@ impl<'a> Array<'a> {
         })
     }
 
-    /// The bits of 32-bit values: key attributes pack integers into reals.
+    /// The bits of an array of 32-bit values: key attributes have integers in an array of reals.
     pub fn words(&self, budget: &mut usize) -> Result<Vec<u32>, &'static str> {
         if self.width() != 4 {
             return Err("an array that should hold 32-bit values doesn't");

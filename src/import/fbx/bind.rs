@@ -1,4 +1,4 @@
-//! The bind poses that a file keeps: where its joints were in the world when meshes were bound to them.
+//! The bind poses of a file: where its joints were in the world when meshes were bound to them.
 
 use super::nodes::Tree;
 use super::numbers::in_range;
@@ -24,7 +24,7 @@ pub(super) fn binds(graph: &Graph, tree: &Tree, budget: usize) -> Vec<Binds> {
     poses.map(|pose| binds(pose.record)).collect()
 }
 
-/// A bone and its matrix; a broken one is passed over, as the motion doesn't need it.
+/// A bone and its matrix. A broken entry is skipped, because the motion doesn't need it.
 fn bind(
     entry: &Element,
     graph: &Graph,

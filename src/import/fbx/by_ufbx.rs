@@ -1,4 +1,4 @@
-//! ASCII, big-endian and old FBX files, read and evaluated by the C library `ufbx`.
+//! ASCII, big-endian and old FBX files: the C library `ufbx` reads them and evaluates their curves.
 
 use super::contents::{bound, constraints_left_out, contents};
 use super::error::FbxError;
@@ -13,19 +13,20 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::time::{Duration, Instant};
 use ufbx::{AllocatorOpts, ElementType, LoadOpts, OpenFileCb, ProgressCb, ProgressResult};
 
-/// Bytes that any file may make ufbx take, and how many more per byte of it, for what it keeps and for what it needs
-/// on the way, each. It takes them from Rust's allocator.
+/// Bytes that ufbx may allocate for any file, and how many more per byte of the file: once for what it keeps, and once for what
+/// it needs while reading. Chosen. It uses Rust's allocator.
 const FREE_BYTES: usize = 8 << 20;
 const BYTES_PER_BYTE: usize = 32;
-/// Most time for reading, and bytes after which it is looked at. Files of a gigabyte take seconds.
+/// Longest time that reading may take, and after how many bytes the clock is checked. Chosen: files of a gigabyte take
+/// seconds.
 const MOST_TIME: Duration = Duration::from_secs(60);
 const LOOK_EVERY: u64 = 1 << 16;
 
-/// Most layers × nodes and moved properties that the takes may have together: to place the nodes once, every layer is
-/// asked about every node. Real files have a thousandth.
-const MOST_QUESTIONS: usize = 1 << 24;
+/// Most look-ups that all takes together may need to place the nodes once: ufbx looks up every node, and every property that
+/// is driven, in every layer. Chosen: real files need a thousandth.
+const MOST_LOOKUPS: usize = 1 << 24;
 
-/// Elements that leave a node nothing but a transform.
+/// Elements that, attached to a node, leave it nothing but a transform.
 const PLAIN: [ElementType; 4] = [
     ElementType::Unknown,
     ElementType::Bone,
@@ -37,7 +38,7 @@ const PLAIN: [ElementType; 4] = [
 pub(super) struct UfbxScene {
     contents: Contents,
     scene: ufbx::SceneRoot,
-    /// ufbx's number of every node.
+    /// ufbx's index of every node.
     ids: Vec<usize>,
     /// Ticks per second.
     ticks: f64,
@@ -53,7 +54,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
     for (at, &id) in ids.iter().enumerate() {
         places[id] = Some(at);
     }
-    let mut budget = MOST_QUESTIONS;
+    let mut budget = MOST_LOOKUPS;
     let stacks = (&scene.anim_stacks).into_iter();
     let takes = stacks
         .map(|stack| take(stack, &settings, &places, &mut budget))
@@ -72,7 +73,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
     Ok(scene)
 }
 
-/// Reads the bytes and no other file.
+/// Reads the bytes, and no other file.
 fn load(bytes: &[u8]) -> Result<ufbx::SceneRoot, FbxError> {
     let limit = || AllocatorOpts {
         memory_limit: bytes
@@ -113,7 +114,7 @@ fn settings(scene: &ufbx::Scene) -> Settings {
     )
 }
 
-/// All nodes but ufbx's root, depth first, and ufbx's numbers of them.
+/// All nodes except ufbx's own root, depth first, and ufbx's indices of them.
 fn tree(scene: &ufbx::Scene) -> (Vec<Node>, Vec<usize>) {
     let (mut nodes, mut ids) = (Vec::new(), Vec::new());
     let children = |node: &ufbx::Node, parent| -> Vec<(usize, Option<usize>)> {
@@ -147,7 +148,7 @@ fn is_plain(node: &ufbx::Node) -> bool {
     attached.all(|element| PLAIN.contains(&element.type_))
 }
 
-/// The curves that place nodes, with the node that each moves.
+/// The curves that place nodes, each with ufbx's index of its node.
 fn curves(stack: &ufbx::AnimStack) -> impl Iterator<Item = (usize, &ufbx::AnimCurve)> {
     let properties = (&stack.layers)
         .into_iter()
@@ -162,17 +163,17 @@ fn curves(stack: &ufbx::AnimStack) -> impl Iterator<Item = (usize, &ufbx::AnimCu
     })
 }
 
-/// Keys of a curve that are looked at in the time that a question takes.
-const KEYS_PER_QUESTION: usize = 64;
+/// How many keys of a curve are read in the time of one look-up. Chosen.
+const KEYS_PER_LOOKUP: usize = 64;
 
-/// Layers × nodes and moved properties of a take.
-fn questions(stack: &ufbx::AnimStack, nodes: usize) -> usize {
+/// Look-ups that a take needs to place the nodes once: layers × nodes, and the properties that are driven.
+fn lookups(stack: &ufbx::AnimStack, nodes: usize) -> usize {
     let properties = (&stack.layers).into_iter().map(|l| l.anim_props.len());
     let layered = stack.layers.len().saturating_mul(nodes);
     properties.sum::<usize>().saturating_add(layered)
 }
 
-/// A take, unless it is more work than is left in `budget`; then one that moves nothing and says why.
+/// The take of a stack. If it needs more work than is left in `budget`, it moves nothing and says why.
 fn take(
     stack: &ufbx::AnimStack,
     settings: &Settings,
@@ -180,9 +181,9 @@ fn take(
     budget: &mut usize,
 ) -> Take {
     let (name, layers) = (stack.element.name.to_string(), stack.layers.len());
-    let channels = questions(stack, places.len());
-    // Curves may be shared by many properties: their keys count wherever they are met.
-    let keys = curves(stack).map(|(_, curve)| curve.keyframes.len() / KEYS_PER_QUESTION);
+    let channels = lookups(stack, places.len());
+    // Many properties may share a curve, so its keys count for each of them.
+    let keys = curves(stack).map(|(_, curve)| curve.keyframes.len() / KEYS_PER_LOOKUP);
     match budget.checked_sub(channels.saturating_add(keys.sum())) {
         Some(left) => {
             *budget = left;
@@ -205,6 +206,7 @@ fn take(
     }
 }
 
+/// The take of a stack, with all that it moves.
 fn moving(
     stack: &ufbx::AnimStack,
     name: String,
@@ -246,7 +248,7 @@ fn varies(curve: &ufbx::AnimCurve) -> bool {
     keys.len() > 1 && keys.iter().any(|key| differs(key) || slopes(key))
 }
 
-/// The bind poses that the file keeps, of bones.
+/// The bones' transforms in every bind pose of the file.
 fn binds(scene: &ufbx::Scene, nodes: &[Node], places: &[Option<usize>]) -> Vec<Binds> {
     let poses = (&scene.poses).into_iter().filter(|pose| pose.is_bind_pose);
     let bind = |bone: &ufbx::BonePose| {

@@ -1,5 +1,5 @@
-//! The clips of real files, and the rest poses of their joints, against `ufbx`: what is left of its nodes' places after
-//! the choice of joints, canonical axes, metres, rigid transforms and single precision.
+//! The clips of real files, and the rest poses of their joints, compared with `ufbx`: the positions of its nodes must survive the
+//! choice of joints, canonical axes, metres, rigid transforms and single precision.
 
 use super::FbxScene;
 use super::against_ufbx::{
@@ -10,8 +10,8 @@ use crate::import::{self, ErrorKind, Options};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 
-/// Front, left and up of the file as ufbx has them, as rows: canonical from file. The axis on a viewer's right is on the
-/// left of the character in front of him.
+/// Front, left and up of the file by ufbx, as rows: canonical from file. What is right for a viewer is left for the character
+/// facing him.
 fn canonical(oracle: &ufbx::Scene) -> Matrix3<f64> {
     let axes = &oracle.settings.axes;
     let row = |axis: &ufbx::CoordinateAxis| match axis {
@@ -43,8 +43,8 @@ fn places(oracle: &ufbx::Scene, index: usize, time: f64) -> BTreeMap<String, Vec
     places
 }
 
-/// Largest distance in metres between the joints of all takes' clips, at every frame, and where ufbx has their nodes,
-/// but for a turn about the up axis if the clip says that it was turned.
+/// Largest distance between the joints of all takes' clips and ufbx's nodes in any frame, metres, up to a turn about the up axis
+/// if the clip says that it was turned.
 pub(super) fn check(file: &str, scene: &FbxScene, oracle: &ufbx::Scene) -> f64 {
     let (_, binary) = bytes_of(file).expect("it was there");
     let mut worst = 0.0f64;
@@ -96,7 +96,7 @@ fn heading(pairs: &[(Vector3<f64>, &Vec<Vector3<f64>>)]) -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::z_axis(), cross.atan2(dot))
 }
 
-/// Every bone below another rests as ufbx says that it was bound; a topmost one keeps the heading that it stands with.
+/// Every bone below another one rests as it was bound, by ufbx. A topmost bone keeps the heading of its node.
 #[test]
 fn bones_rest_in_their_bind_pose() {
     let Some((scene, oracle)) = open("torture-fbx/blender_293_barbarian_7400_binary.fbx") else {
@@ -129,7 +129,7 @@ fn bones_rest_in_their_bind_pose() {
     assert_eq!(scene.contents().problems[0].id, "rest-from-bind-pose");
 }
 
-/// These were bound with other joint axes, a quarter turn about the up axis from where their joints stand.
+/// These were bound with other joint axes, a quarter turn about the up axis away from their joints.
 #[test]
 fn a_bind_pose_that_only_faces_another_way_is_left() {
     for name in ["MMAKick", "Backflip", "Running", "Walking"] {

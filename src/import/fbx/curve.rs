@@ -11,14 +11,14 @@ pub(super) struct Curve {
     keys: Vec<Key>,
     before: Beyond,
     after: Beyond,
-    /// Units per tick at the last key.
+    /// Slope with which the curve arrives at its last key, units per tick.
     end_slope: f64,
-    /// Keys were out of order or not finite.
+    /// Whether keys were out of order or not finite.
     pub mended: bool,
 }
 
 impl Curve {
-    /// Reads an `AnimationCurve`; `None` where it has no keys. `ticks` is the number of ticks per second.
+    /// Reads an `AnimationCurve`; `None` if it has no keys. `ticks` is ticks per second.
     pub fn read(
         record: &Element,
         ticks: f64,
@@ -63,7 +63,7 @@ impl Curve {
         self.keys.windows(2).map(|pair| pair[1].tick - pair[0].tick)
     }
 
-    /// Whether not all keys within `start..=end` have the same value.
+    /// Whether the curve changes from `start` to `end`, in ticks, as far as its keys and its ends show.
     pub fn varies(&self, start: f64, end: f64) -> bool {
         let mut inside = self
             .keys
@@ -74,7 +74,7 @@ impl Curve {
         inside.any(|value| Some(value) != first) || self.value(start) != self.value(end)
     }
 
-    /// The curve's value at `tick`.
+    /// The curve's value at `tick`: degrees of a rotation, the file's units of a translation.
     pub fn value(&self, tick: f64) -> f64 {
         let [first, .., last] = self.keys.as_slice() else {
             return self.keys.first().map_or(0.0, |key| key.value);
@@ -88,6 +88,7 @@ impl Curve {
         }
     }
 
+    /// The value at a tick that isn't outside the keys.
     fn inside(&self, tick: f64) -> f64 {
         let at = self.segment_at(tick);
         let (Some(key), next) = (self.keys.get(at), self.keys.get(at + 1)) else {
@@ -99,7 +100,7 @@ impl Curve {
         }
     }
 
-    /// Index of the last key that isn't after `tick`. Baked curves have even keys: there the guess is the answer.
+    /// Index of the last key that isn't after `tick`. Baked curves have even keys, and there the guess is right at once.
     fn segment_at(&self, tick: f64) -> usize {
         let last = self.keys.len() - 1;
         let (start, end) = (self.keys[0].tick, self.keys[last].tick);
@@ -115,6 +116,7 @@ impl Curve {
             .saturating_sub(1)
     }
 
+    /// The value at a tick outside the keys, next to the key `edge`, where the curve has `slope`.
     fn beyond(&self, beyond: Beyond, edge: &Key, slope: f64, tick: f64) -> f64 {
         match beyond {
             Beyond::Hold => edge.value,
@@ -127,7 +129,8 @@ impl Curve {
         }
     }
 
-    /// Value at a tick outside the keys when the curve repeats there.
+    /// The value at a tick outside the keys, where the curve repeats. `turn` counts the repetitions before the one that the
+    /// tick is in, starting at 0, and `rest` is how far into it the tick is. After the last repetition its end holds.
     fn cycle(&self, tick: f64, repeats: Option<f64>, mirror: bool, climb: bool) -> f64 {
         let [first, .., last] = self.keys.as_slice() else {
             return 0.0;
@@ -160,7 +163,7 @@ impl Curve {
         self.inside(first.tick + from_start) + if forward { climbed } else { -climbed }
     }
 
-    /// Units per tick at the first key.
+    /// Slope with which the curve leaves its first key, units per tick.
     fn start_slope(&self) -> f64 {
         match self.keys.as_slice() {
             [key, next, ..] => leaving_slope(key, next),

@@ -1,4 +1,4 @@
-//! The binary container: nested records with typed values, borrowed from the file's bytes.
+//! The binary container: a header and records.
 
 use super::error::{FbxError, broken};
 use super::record::Element;
@@ -15,25 +15,29 @@ const WIDE_VERSION: u32 = 7500;
 /// A parsed file.
 #[derive(Debug)]
 pub(super) struct Document<'a> {
+    /// The top-level records.
     pub records: Vec<Element<'a>>,
     /// Bytes that may still be decoded from arrays.
     pub budget: usize,
 }
 
 impl<'a> Document<'a> {
+    /// Parses a binary file of version 7.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, FbxError> {
         let wide = version(bytes)? >= WIDE_VERSION;
         let tape = Tape::new(bytes, readable(bytes, HEADER_LEN, wide)?);
         let header = FbxHeader::load(&tape).map_err(|_| FbxError::NotFbx)?;
-        // After the scan only an end marker can be out of place.
+        // After the scan, only an end marker can be in the wrong place.
         let records = tape.records(header).map_err(|_| {
             let reason = "a record's end marker isn't where the record ends";
             broken(tape.place(), reason)
         })?;
+        // Chosen: what real files unpack is far below, and 3 MiB let a small file have some long curves.
         let budget = bytes.len().saturating_mul(6).saturating_add(3 << 20);
         Ok(Self { records, budget })
     }
 
+    /// The first top-level record of this name.
     pub fn record(&self, name: &str) -> Option<&Element<'a>> {
         self.records
             .iter()
@@ -62,7 +66,7 @@ fn version(bytes: &[u8]) -> Result<u32, FbxError> {
     }
 }
 
-/// Whether this is FBX as a text.
+/// Whether this is FBX as text.
 pub(crate) fn is_ascii(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     let has = |word: &[u8]| head.windows(word.len()).any(|window| window == word);

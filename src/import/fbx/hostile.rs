@@ -1,4 +1,4 @@
-//! Broken, truncated and hostile bytes: an error or a scene, never a panic, a hang or a flood of memory.
+//! Broken, truncated and hostile bytes give an error or a scene, but never a panic, a hang or an endless allocation.
 
 use super::{FbxError, read, synthetic};
 use crate::import::scene::Scene;
@@ -11,7 +11,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::io::Cursor;
 use std::time::{Duration, Instant};
 
-/// Reads and, where that works, samples; fails the test if it takes long.
+/// Reads bytes and, if that works, samples the scene. Fails the test if it takes long.
 fn survives(bytes: &[u8]) {
     let start = Instant::now();
     if let Ok(scene) = read(bytes) {

@@ -2,39 +2,53 @@
 
 use super::tangent::THIRD;
 
+/// A key and the segment after it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Key {
+    /// Time, in ticks of the file's clock.
     pub tick: f64,
+    /// Degrees of a rotation, the file's units of a translation.
     pub value: f64,
     /// How the curve runs from this key to the next.
     pub segment: Segment,
 }
 
+/// The curve between two keys.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Segment {
+    /// The first key's value.
     Hold,
+    /// The second key's value.
     HoldNext,
+    /// A straight line.
     Line,
+    /// A cubic Bézier curve with these handles.
     Cubic { leave: Handle, arrive: Handle },
 }
 
-/// A Bezier handle, seen from its key towards the inside of the segment.
+/// A Bézier handle, from its key towards the inside of the segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Handle {
     /// Fraction of the segment's time.
     pub weight: f64,
-    /// Value of the curve that the tangent gains over the handle's time, in the direction of time.
+    /// How much the tangent rises over the handle's time, forward in time.
     pub rise: f64,
 }
 
 /// What a curve does before its first or after its last key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Beyond {
+    /// It keeps the key's value.
     Hold,
+    /// It goes straight on.
     Slope,
+    /// It repeats.
     Cycle {
+        /// How often; without end where nothing is said.
         repeats: Option<f64>,
+        /// Every second repetition runs backward.
         mirror: bool,
+        /// Each repetition starts where the one before ended.
         climb: bool,
     },
 }
@@ -63,7 +77,7 @@ fn ratio(rise: f64, run: f64) -> f64 {
     if run > 0.0 { rise / run } else { 0.0 }
 }
 
-/// The curve at `tick`, which lies after `key` and before `next`.
+/// The curve at `tick`, which is after `key` and before `next`.
 pub(super) fn between(key: &Key, next: &Key, tick: f64) -> f64 {
     let s = (tick - key.tick) / (next.tick - key.tick);
     match key.segment {
@@ -83,13 +97,15 @@ pub(super) fn between(key: &Key, next: &Key, tick: f64) -> f64 {
     }
 }
 
+/// A cubic in Bernstein form at `t`.
 fn bernstein([p0, p1, p2, p3]: [f64; 4], t: f64) -> f64 {
     let u = 1.0 - t;
     u * u * u * p0 + 3.0 * u * t * (u * p1 + t * p2) + t * t * t * p3
 }
 
-/// Parameter at which a Bezier curve with controls 0, `x1`, `x2`, 1 reaches `x`, by Newton's method kept inside a
-/// shrinking bracket. With both handles at a third, parameter and time are the same.
+/// The parameter at which a Bézier curve with the control times 0, `x1`, `x2`, 1 reaches the time `x`, by Newton's method inside
+/// a shrinking bracket. With both handles at a third, parameter and time are the same. Sixty halvings of the bracket would
+/// be enough for the last bit of a double.
 fn bezier_parameter(x1: f64, x2: f64, x: f64) -> f64 {
     if x1 == THIRD && x2 == 1.0 - THIRD {
         return x;

@@ -1,4 +1,4 @@
-//! Keys of animation curves, from the file's arrays.
+//! Keys of animation curves, from the file's arrays. The flags are those of `KeyAttrFlags`, as ufbx lists them.
 
 use super::array::Array;
 use super::key::{Beyond, Handle, Key, Segment, arriving_slope};
@@ -17,12 +17,14 @@ const LINEAR: Attribute = Attribute {
 
 /// A key as the file has it.
 pub(super) struct RawKey {
+    /// Time, in ticks of the file's clock.
     pub tick: f64,
     pub value: f64,
+    /// How the curve passes it.
     pub attribute: Attribute,
 }
 
-/// Keys in file order; none where the record has no arrays.
+/// The keys in file order; none if the record has no arrays.
 pub(super) fn raw_keys(record: &Element, budget: &mut usize) -> Result<Vec<RawKey>, &'static str> {
     let (Some(times), Some(values)) = (record.array("KeyTime"), record.array("KeyValueFloat"))
     else {
@@ -43,7 +45,7 @@ pub(super) fn raw_keys(record: &Element, budget: &mut usize) -> Result<Vec<RawKe
         .collect())
 }
 
-/// One attribute per key, from the run-length form of the file.
+/// One attribute per key, out of the file's run-length form.
 fn attributes(
     record: &Element,
     count: usize,
@@ -83,8 +85,8 @@ fn attributes(
     }
 }
 
-/// Keys with their segments from ordered raw keys, and the slope in units per tick with which the curve arrives at its
-/// last key. `ticks` is ticks per second.
+/// The keys, in order, with their segments, and the slope in units per tick with which the curve arrives at its last key. `ticks`
+/// is ticks per second.
 pub(super) fn keys(raw: &[RawKey], ticks: f64) -> (Vec<Key>, f64) {
     let sides: Vec<_> = (0..raw.len()).map(|i| sides(raw, i, ticks)).collect();
     let keys = raw.iter().enumerate().map(|(i, key)| {
@@ -110,6 +112,7 @@ pub(super) fn keys(raw: &[RawKey], ticks: f64) -> (Vec<Key>, f64) {
     (keys, end)
 }
 
+/// Slopes of a key to its left and right, units per second.
 fn sides(raw: &[RawKey], index: usize, ticks: f64) -> (f64, f64) {
     let step = |a: &RawKey, b: &RawKey, weight: f64| {
         let time = (b.tick - a.tick) / ticks;
@@ -128,7 +131,7 @@ fn sides(raw: &[RawKey], index: usize, ticks: f64) -> (f64, f64) {
     slopes_of(own, previous, before, after)
 }
 
-/// A key that isn't cubic itself still ends a cubic segment, with the slope that the key before it holds.
+/// A key that isn't cubic itself may still end a cubic segment, with the slope that the key before it states.
 fn slopes_of(
     own: &RawKey,
     previous: Option<&RawKey>,
@@ -146,6 +149,8 @@ fn is_cubic(attribute: &Attribute) -> bool {
     attribute.has(CUBIC) && !attribute.has(CONSTANT)
 }
 
+/// The segment after a key that leaves it with the slope `leaving` and arrives with `arriving`, units per second, after
+/// `seconds`.
 fn segment(attribute: &Attribute, leaving: f64, arriving: f64, seconds: f64) -> Segment {
     if attribute.has(CONSTANT) {
         return if attribute.has(CONSTANT_NEXT) {
@@ -167,9 +172,9 @@ fn segment(attribute: &Attribute, leaving: f64, arriving: f64, seconds: f64) -> 
     }
 }
 
-/// What a `Pre-Extrapolation` or `Post-Extrapolation` record says.
+/// What a `Pre-Extrapolation` or `Post-Extrapolation` record states.
 pub(super) fn beyond(record: &Element) -> Beyond {
-    // The type is one letter, written as a character code.
+    // The type is one letter, stored as its character code.
     let kind = record
         .child("Type")
         .and_then(|kind| kind.int(0))

@@ -1,4 +1,4 @@
-//! Small files made for one trait each, the values worked out by hand.
+//! Small files, each made to show one thing, with expected values worked out by hand.
 
 use super::{FbxScene, read};
 use crate::import::scene::Scene;

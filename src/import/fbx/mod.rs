@@ -1,4 +1,8 @@
-//! FBX. Binary files of versions 7.0 to 7.9 are read here, all others, with the feature `ufbx`, by that library.
+//! FBX. Binary files of versions 7.0 to 7.9 are read here. With the feature `ufbx`, that library reads all others.
+//!
+//! From bytes to motion: `scan` checks lengths, `fbxcel` and `tape` make `record`s of them, `objects` connects these to a
+//! graph, `nodes` makes the tree of models, and `animation` finds the curves that drive it. A node's place is composed by
+//! `transform`. Every node of every take is compared with ufbx in the tests.
 
 mod animation;
 mod array;
@@ -60,11 +64,13 @@ use transform::World;
 /// A parsed FBX file.
 pub(crate) struct FbxScene {
     contents: Contents,
+    /// What places each node.
     rigs: Vec<Rig>,
-    /// One per take.
+    /// The animation of every take.
     animations: Vec<Animation>,
+    /// All curves.
     curves: Vec<Curve>,
-    /// Ticks per second.
+    /// Ticks per second of the file's clock.
     ticks: f64,
 }
 
@@ -127,6 +133,7 @@ fn read(bytes: &[u8]) -> Result<FbxScene, FbxError> {
     Ok(scene)
 }
 
+/// Warnings about what was cut from the graph, or isn't evaluated.
 fn graph_problems(graph: &Graph, tree: &Tree) -> Vec<Problem> {
     let mut problems = Vec::new();
     if tree.circular {
@@ -146,7 +153,7 @@ impl Scene for FbxScene {
         &self.contents
     }
 
-    /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
+    /// Times are rounded to the nearest tick of the file's clock, so that a frame falls on its keys exactly.
     fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
         let moment = at.and_then(|(take, time)| {
             let animation = self.animations.get(take)?;

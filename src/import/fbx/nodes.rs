@@ -1,4 +1,4 @@
-//! The tree of models.
+//! The tree of models: the nodes of an FBX file.
 
 use super::objects::Graph;
 use super::properties::{Properties, Templates};
@@ -22,23 +22,28 @@ const SOLID: [&[u8]; 12] = [
     b"Boundary",
 ];
 
-/// What it takes to place a node.
+/// What places a node in its parent.
 pub(super) struct Rig {
+    /// Its properties without animation.
     pub rest: Pose,
+    /// How they become a transform.
     pub rules: Rules,
 }
 
-/// All models, parents first; the three lists run in parallel.
+/// All models, parents first.
 pub(super) struct Tree {
+    /// The nodes.
     pub nodes: Vec<Node>,
+    /// What places each node.
     pub rigs: Vec<Rig>,
-    /// Node of every object that is a model.
+    /// Index of the node of every object; `None` of those that aren't models.
     pub of_object: Vec<Option<usize>>,
-    /// Some connections made a circle and were cut.
+    /// Whether some connections made a circle, which was cut.
     pub circular: bool,
 }
 
 impl Tree {
+    /// The models of a graph.
     pub fn read(graph: &Graph, templates: &Templates) -> Self {
         let parents: Vec<Option<usize>> = (0..graph.objects.len())
             .map(|object| {
@@ -66,7 +71,7 @@ impl Tree {
         {
             tree.grow(root, &children, graph, templates);
         }
-        // Whoever hasn't been reached hangs on a circle: its first member becomes a root.
+        // What no root reaches is in a circle, or below one: the first of them becomes a root.
         for object in graph.of_class("Model") {
             if tree.of_object[object].is_none() {
                 tree.circular = true;

@@ -1,10 +1,12 @@
-//! Objects of the file and the graph that connects them.
+//! Objects of the file, and the connections between them.
 
 use super::document::Document;
 use super::record::{Element, Value};
 use std::collections::BTreeMap;
 
+/// An object.
 pub(super) struct Object<'d, 'a> {
+    /// Its name, without its class.
     pub name: String,
     /// E.g. `LimbNode` for a `Model`.
     pub kind: &'a [u8],
@@ -13,22 +15,26 @@ pub(super) struct Object<'d, 'a> {
 }
 
 impl Object<'_, '_> {
+    /// Whether its class is `class`.
     pub fn is(&self, class: &str) -> bool {
         self.record.name == class.as_bytes()
     }
 }
 
-/// One connection, by indices of objects.
+/// A connection.
 #[derive(Clone, Copy)]
 pub(super) struct Link<'a> {
+    /// Index of the child object.
     pub child: usize,
+    /// Index of the parent object.
     pub parent: usize,
-    /// The parent's property that the child drives.
+    /// The parent's property that the child drives, if it drives one.
     pub property: Option<&'a [u8]>,
 }
 
-/// All objects, in file order, and their connections.
+/// All objects and their connections.
 pub(super) struct Graph<'d, 'a> {
+    /// The objects, in file order.
     pub objects: Vec<Object<'d, 'a>>,
     /// Connections to the object's children, in file order.
     children: Vec<Vec<Link<'a>>>,
@@ -38,6 +44,7 @@ pub(super) struct Graph<'d, 'a> {
 }
 
 impl<'d, 'a> Graph<'d, 'a> {
+    /// The objects and connections of a file.
     pub fn read(document: &'d Document<'a>) -> Self {
         let mut objects = Vec::new();
         let mut by_id = BTreeMap::new();
@@ -91,7 +98,7 @@ impl<'d, 'a> Graph<'d, 'a> {
         self.parents[child].push(link);
     }
 
-    /// The object of this id.
+    /// The object with this id.
     pub fn with_id(&self, id: i64) -> Option<usize> {
         self.by_id.get(&id).copied()
     }

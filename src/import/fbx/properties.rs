@@ -1,11 +1,11 @@
-//! Properties of objects, with the defaults that the file's templates state.
+//! Properties of objects, with their defaults from the file's templates.
 
 use super::document::Document;
 use super::record::{Element, Value};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// Name, type, label and flags stand before a property's values.
+/// A property's values come after its name, type, label and flags.
 const VALUES_AT: usize = 4;
 
 /// The values of a template's properties by their names.
@@ -17,6 +17,7 @@ pub(super) struct Templates<'d, 'a> {
 }
 
 impl<'d, 'a> Templates<'d, 'a> {
+    /// The templates of a file.
     pub fn read(document: &'d Document<'a>) -> Self {
         let mut by_class = BTreeMap::new();
         let kinds = document
@@ -42,7 +43,7 @@ impl<'d, 'a> Templates<'d, 'a> {
     }
 }
 
-/// The first of properties of one name counts.
+/// The properties of a template by name: the first of each name counts.
 fn index<'d, 'a>(list: &'d Element<'a>) -> Template<'d, 'a> {
     let mut index = Template::new();
     for property in &list.children {
@@ -61,6 +62,7 @@ pub(super) struct Properties<'s, 'd, 'a> {
 }
 
 impl<'d, 'a> Properties<'_, 'd, 'a> {
+    /// The properties of a record without a template.
     pub fn of(record: &'d Element<'a>) -> Self {
         Self {
             own: record.child("Properties70"),
@@ -68,6 +70,7 @@ impl<'d, 'a> Properties<'_, 'd, 'a> {
         }
     }
 
+    /// The values of a property, the object's own before those of its template.
     fn values(&self, name: &str) -> Option<&'d [Value<'a>]> {
         let find = |list: &'d Element<'a>| {
             let property = list
@@ -80,14 +83,17 @@ impl<'d, 'a> Properties<'_, 'd, 'a> {
         self.own.and_then(find).or_else(template)
     }
 
+    /// A property that is an integer.
     pub fn int(&self, name: &str) -> Option<i64> {
         self.values(name)?.first()?.int()
     }
 
+    /// A property that is a real.
     pub fn real(&self, name: &str) -> Option<f64> {
         self.values(name)?.first()?.real()
     }
 
+    /// A property that is a vector.
     pub fn vector(&self, name: &str) -> Option<Vector3<f64>> {
         match self.values(name)? {
             [x, y, z, ..] => Some(Vector3::new(x.real()?, y.real()?, z.real()?)),

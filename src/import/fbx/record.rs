@@ -6,11 +6,13 @@ use super::numbers::in_range;
 /// A record: a name, values and nested records.
 #[derive(Debug)]
 pub(super) struct Element<'a> {
+    /// Usually ASCII.
     pub name: &'a [u8],
     pub values: Vec<Value<'a>>,
     pub children: Vec<Element<'a>>,
 }
 
+/// A value of a record.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Value<'a> {
     Int(i64),
@@ -20,16 +22,19 @@ pub(super) enum Value<'a> {
 }
 
 impl<'a> Element<'a> {
+    /// The first child of this name.
     pub fn child(&self, name: &str) -> Option<&Element<'a>> {
         self.children
             .iter()
             .find(|child| child.name == name.as_bytes())
     }
 
+    /// The value at `index` as an integer.
     pub fn int(&self, index: usize) -> Option<i64> {
         self.values.get(index).and_then(Value::int)
     }
 
+    /// The text at `index`.
     pub fn text(&self, index: usize) -> Option<&'a [u8]> {
         match self.values.get(index) {
             Some(&Value::Text(text)) => Some(text),
@@ -47,7 +52,7 @@ impl<'a> Element<'a> {
 }
 
 impl Value<'_> {
-    /// Reals are cut off towards zero, as exporters write some enumerations as reals.
+    /// The value as an integer. Exporters write some enumerations as reals: these are cut off towards zero.
     pub fn int(&self) -> Option<i64> {
         match *self {
             Value::Int(value) => Some(value),
@@ -56,7 +61,7 @@ impl Value<'_> {
         }
     }
 
-    /// Only values that later arithmetic can't overflow.
+    /// The value as a real, if later arithmetic with it can't overflow.
     pub fn real(&self) -> Option<f64> {
         match *self {
             Value::Int(value) => Some(value as f64),

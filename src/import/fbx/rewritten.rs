@@ -1,5 +1,5 @@
-//! ASCII files of version 7 rewritten as binary ones, so that they can be checked too. `fbxcel` writes them, with
-//! compressed arrays.
+//! Rewrites ASCII files of version 7 as binary ones, with compressed arrays, so that they can be compared with ufbx too. `fbxcel`
+//! writes them.
 
 use fbxcel::low::FbxVersion;
 use fbxcel::low::v7400::ArrayAttributeEncoding;

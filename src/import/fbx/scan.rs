@@ -14,11 +14,11 @@ const MAX_DEPTH: usize = 64;
 /// Count, encoding and byte length of an array.
 pub(super) const ARRAY_HEADER: usize = 12;
 
-/// A copy of `bytes` that `fbxcel` reads without fail, as long as its records end where they say. Every byte keeps its
-/// place; `start` is the first record's, and `wide` says whether record headers are 64-bit.
+/// A copy of `bytes` that `fbxcel` reads without fail, if end markers are where records end. Every byte keeps its place. `start`
+/// is that of the first record, and `wide` says whether record headers are 64-bit.
 ///
-/// Changed are names outside ASCII, which `fbxcel` refuses if they aren't UTF-8; type letters that it doesn't know, to
-/// those of the same layout; and the encoding of arrays, to none, so that it skips them without opening a decoder.
+/// The copy differs in three ways. Names have `?` for bytes outside ASCII. Types that `fbxcel` doesn't know are replaced by types
+/// of the same layout. And no array is compressed, so that `fbxcel` skips it without a decoder.
 pub(super) fn readable(bytes: &[u8], start: usize, wide: bool) -> Result<Vec<u8>, FbxError> {
     let mut scan = Scan {
         bytes,
@@ -35,10 +35,15 @@ struct Scan<'a> {
     copy: Vec<u8>,
 }
 
+/// Header of a record.
 struct Header {
+    /// Place of the byte after the record.
     end: usize,
+    /// Number of values.
     values: u64,
+    /// Bytes of all values.
     values_len: usize,
+    /// Bytes of the name.
     name_len: usize,
 }
 
@@ -93,13 +98,14 @@ impl<'a> Scan<'a> {
         Ok((header, at + bytes.len()))
     }
 
+    /// `len` bytes at `at`, which must end within `end`.
     fn slice(&self, at: usize, len: usize, end: usize) -> Result<&'a [u8], FbxError> {
         let stop = at.checked_add(len).filter(|&stop| stop <= end);
         stop.and_then(|stop| self.bytes.get(at..stop))
             .ok_or_else(|| broken(at, "the data ends early"))
     }
 
-    /// Gives the byte after the name.
+    /// Checks a name, and returns the place after it.
     fn name(&mut self, at: usize, len: usize, end: usize) -> Result<usize, FbxError> {
         let name = self.slice(at, len, end)?;
         for (place, byte) in (at..).zip(name) {
@@ -110,6 +116,7 @@ impl<'a> Scan<'a> {
         Ok(at + len)
     }
 
+    /// Checks that `count` values fill the bytes from `at` to `end`.
     fn values(&mut self, mut at: usize, end: usize, count: u64) -> Result<(), FbxError> {
         for _ in 0..count {
             at = self.value(at, end)?;
@@ -121,7 +128,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Gives the byte after the value.
+    /// Checks a value, and returns the place after it.
     fn value(&mut self, at: usize, end: usize) -> Result<usize, FbxError> {
         let kind = self.slice(at, 1, end)?[0];
         let body = at + 1;
@@ -149,7 +156,7 @@ impl<'a> Scan<'a> {
         self.slice(at, 4, end).map(|bytes| word(bytes) as usize)
     }
 
-    /// Gives the array's length with its header.
+    /// Checks an array, and returns its length with its header.
     fn array(&mut self, at: usize, end: usize) -> Result<usize, FbxError> {
         let encoding = at + 4;
         if self.length(encoding, end)? > 1 {

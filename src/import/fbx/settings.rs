@@ -1,18 +1,18 @@
-//! Axes, unit, frame rate and clock of the file.
+//! Axes, unit of length, frame rate and clock of the file.
 
 use super::document::Document;
 use super::properties::Properties;
 use crate::clip::Problem;
 use nalgebra::{Matrix3, Vector3};
 
-/// Ticks per second of FBX 7.
+/// Ticks per second of FBX 7 (`KTime`).
 const TICKS: f64 = 46_186_158_000.0;
-/// Ticks per second of the clock that newer files may opt in to.
+/// Ticks per second of the clock that newer files may choose.
 const NEW_TICKS: f64 = 141_120_000.0;
-/// Value of `TCDefinition` that keeps the old clock; header versions before 1004 don't know the choice.
+/// The value of `TCDefinition` that keeps the old clock, and the first header version with that choice (both as in ufbx).
 const OLD_CLOCK: i64 = 127;
 const CLOCK_CHOICE: i64 = 1004;
-/// Frame rates of `TimeMode`; 0 stands for none stated.
+/// Frame rates of `TimeMode` (`FbxTime::EMode` of the FBX SDK), Hz; 0 where the mode states none.
 const FPS: [f64; 18] = [
     0.0,
     120.0,
@@ -37,17 +37,22 @@ const CUSTOM_MODE: usize = 14;
 
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
+    /// E.g. `+Y`.
     pub up_axis: String,
+    /// From the file's axes to Z up, X forward, Y left.
     pub canonical_from_file: Matrix3<f64>,
+    /// Metres per unit: the file states centimetres.
     pub unit_m: f64,
-    /// Frame rate that the file states.
+    /// Frame rate that the file states, Hz.
     pub fps: Option<f64>,
-    /// Ticks per second.
+    /// Ticks per second of its clock.
     pub ticks: f64,
+    /// What is wrong with them.
     pub problems: Vec<Problem>,
 }
 
 impl Settings {
+    /// The settings of a file.
     pub fn read(document: &Document) -> Self {
         let record = document.record("GlobalSettings");
         let properties = record.map(Properties::of);
@@ -58,7 +63,7 @@ impl Settings {
         )
     }
 
-    /// The settings of properties that are looked up by their names.
+    /// The settings by properties, which are looked up by name.
     pub fn of(
         int: impl Fn(&str) -> Option<i64>,
         real: impl Fn(&str) -> Option<f64>,
@@ -94,6 +99,7 @@ impl Settings {
     }
 }
 
+/// The rate of a time mode, from 1 to 1000 Hz.
 fn fps(mode: Option<i64>, custom: Option<f64>) -> Option<f64> {
     let mode = usize::try_from(mode?).ok()?;
     let fps = if mode == CUSTOM_MODE {
@@ -104,6 +110,7 @@ fn fps(mode: Option<i64>, custom: Option<f64>) -> Option<f64> {
     (1.0..=1000.0).contains(&fps).then_some(fps)
 }
 
+/// Ticks per second of the file's clock.
 fn ticks(document: &Document) -> f64 {
     let header = document.record("FBXHeaderExtension");
     let version = header
@@ -148,12 +155,12 @@ fn signed_axis(index: i64, sign: Option<i64>) -> Option<Axis> {
     })
 }
 
-/// The three axes that `GlobalSettings` names, as they stand to a character in the scene.
+/// The three axes of `GlobalSettings`, as directions of a character in the scene.
 ///
-/// FBX's front axis points out of the front view towards whoever looks at it, so a character in its usual pose faces
-/// along it: +Z in a Y-up file, −Y in a Z-up one. The coordinate axis is right in that view, which is the character's
-/// left. So front, left and up are the canonical X, Y and Z, and the matrix has them as its rows. It is a rotation
-/// where the three are right-handed (left × up = front) and a reflection where the file says they are left-handed.
+/// FBX's front axis points out of the front view towards the viewer, so a character in its usual pose faces along it: +Z in a
+/// Y-up file, −Y in a Z-up one. The coordinate axis points right in that view, which is the character's left. So front,
+/// left and up are the canonical X, Y and Z, and are the rows of the matrix. It is a rotation if the three are right-handed
+/// (left × up = front), and a reflection if the file says that they are left-handed.
 struct Axes {
     up: Axis,
     front: Axis,
@@ -172,8 +179,8 @@ impl Axes {
         Self { up, front, left }
     }
 
-    /// The front axis is stored as an index, but a few writers store FBX's parity instead: 1 for the first and 2 for
-    /// the second of the two axes that aren't up. It shows where the number names the up axis itself.
+    /// The front axis. The file has its index, but a few writers store FBX's parity instead: 1 for the first and 2 for the second
+    /// of the two axes that aren't up. That shows where the number is the index of the up axis itself.
     fn settle(up: Axis, front: Axis) -> Axis {
         if front.index != up.index {
             return front;

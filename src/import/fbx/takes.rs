@@ -9,18 +9,19 @@ use crate::clip::Problem;
 use crate::import::scene::Take;
 use std::collections::BTreeMap;
 
-/// Longer spans are unset markers, not takes.
+/// Longest take, seconds. Chosen: longer spans come from markers that nobody set.
 const MAX_SECONDS: f64 = 6.0 * 3600.0;
+/// Rate of takes whose file and keys say nothing, Hz. Chosen.
 const FALLBACK_FPS: f64 = 30.0;
 
-/// Start and stop that the file's list of takes states, in ticks: the take's own and its reference.
+/// Start and stop in ticks, as the file's list of takes states them: of the take itself, and of its reference.
 #[derive(Default)]
 pub(super) struct Span {
     local: Option<(i64, i64)>,
     reference: Option<(i64, i64)>,
 }
 
-/// The list of takes, by name. Old writers state times only there.
+/// The list of takes, by name. Old writers state a take's times only there.
 pub(super) fn spans(document: &Document) -> BTreeMap<String, Span> {
     let list = document
         .record("Takes")
@@ -38,18 +39,19 @@ pub(super) fn spans(document: &Document) -> BTreeMap<String, Span> {
     takes.filter_map(span).collect()
 }
 
-/// What a file says of a take's time.
+/// What a file states about a take's time.
 pub(super) struct Stated<'s, 'd, 'a> {
+    /// Those of the animation stack.
     pub properties: Properties<'s, 'd, 'a>,
-    /// What the list of takes says.
+    /// What the list of takes states.
     pub listed: Option<&'s Span>,
     /// Ticks per second.
     pub ticks: f64,
-    /// Frame rate, where it is stated.
+    /// Frame rate, Hz, if stated.
     pub fps: Option<f64>,
 }
 
-/// Makes the take `name` of an animation.
+/// The take of an animation.
 pub(super) fn take(name: &str, stated: &Stated, animation: &Animation, curves: &[Curve]) -> Take {
     let (ticks, keyed) = (stated.ticks, key_range(animation, curves));
     let (start, end) = span(stated, keyed);
@@ -99,13 +101,13 @@ fn all_curves<'a>(
         .flat_map(move |node| curves_of(animation, node, curves))
 }
 
-/// First and last tick of the curves that move nodes.
+/// First and last tick of all curves that drive nodes.
 fn key_range(animation: &Animation, curves: &[Curve]) -> Option<(f64, f64)> {
     let ends = all_curves(animation, curves).map(Curve::ends);
     ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// Start and end in seconds: the take's own span, else its reference span, else that of its keys.
+/// Start and end in seconds: the take's own span, else its reference span, else the span of its keys.
 fn span(take: &Stated, keyed: Option<(f64, f64)>) -> (f64, f64) {
     let (properties, ticks) = (&take.properties, take.ticks);
     let stated = |start, stop, listed: Option<(i64, i64)>| {
@@ -128,7 +130,7 @@ fn span(take: &Stated, keyed: Option<(f64, f64)>) -> (f64, f64) {
     first_sane(&spans)
 }
 
-/// The first of `spans` that isn't too long, or, where all are, the beginning of the last, that of the keys.
+/// The first of `spans` that isn't too long. If all are, the beginning of the last one, which is that of the keys.
 pub(super) fn first_sane(spans: &[Option<(f64, f64)>]) -> (f64, f64) {
     let sane = |(start, end): &&(f64, f64)| end - start <= MAX_SECONDS;
     let keyed = spans.last().copied().flatten();
@@ -137,7 +139,7 @@ pub(super) fn first_sane(spans: &[Option<(f64, f64)>]) -> (f64, f64) {
     whole.or_else(cut).unwrap_or((0.0, 0.0))
 }
 
-/// The rate that a file states, else that of its keys, else a usual one. `spacings` are in ticks.
+/// Frame rate, Hz: the one that the file states, else that of its keys, else 30. `spacings` of keys are in ticks.
 pub(super) fn rate(stated: Option<f64>, spacings: impl Iterator<Item = f64>, ticks: f64) -> f64 {
     stated.unwrap_or_else(|| spacing_fps(spacings, ticks).unwrap_or(FALLBACK_FPS))
 }
@@ -152,7 +154,7 @@ fn spacing_fps(spacings: impl Iterator<Item = f64>, ticks: f64) -> Option<f64> {
         .into_iter()
         .max_by_key(|&(spacing, count)| (count, std::cmp::Reverse(spacing)))?;
     let fps = ticks / spacing as f64;
-    // Exporters round key times to ticks or milliseconds.
+    // Exporters round key times to ticks or milliseconds: a whole number within 0.1 % is meant.
     let whole = fps.round();
     let fps = if (fps - whole).abs() < 1e-3 * whole {
         whole
@@ -162,7 +164,7 @@ fn spacing_fps(spacings: impl Iterator<Item = f64>, ticks: f64) -> Option<f64> {
     (1.0..=1000.0).contains(&fps).then_some(fps)
 }
 
-/// What a take's owner should know about it.
+/// Problems with the curves and layers of a take.
 fn problems(take: &Take, animation: &Animation, curves: &[Curve]) -> Vec<Problem> {
     let mut problems = Vec::new();
     if all_curves(animation, curves).any(|curve| curve.mended) {
@@ -182,7 +184,7 @@ fn problems(take: &Take, animation: &Animation, curves: &[Curve]) -> Vec<Problem
     problems
 }
 
-/// What should be known of a take's span. `keyed` is that of its keys, in seconds.
+/// Problems with the span of a take. `keyed` is the span of its keys, seconds.
 pub(super) fn span_problems(take: &Take, keyed: Option<(f64, f64)>) -> Vec<Problem> {
     let mut problems = Vec::new();
     let mut note = |id, message: String| problems.push(Problem::note(id, message));

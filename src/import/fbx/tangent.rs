@@ -1,4 +1,7 @@
 //! Slopes of cubic keys: automatic, TCB, and set by the user.
+//!
+//! Autodesk doesn't publish how automatic slopes are computed. The formulas and their constants here are those that ufbx found
+//! (`ufbxi_solve_auto_tangent` in ufbx 0.11), with which all curves of the test files are compared.
 
 use super::numbers::in_range;
 
@@ -21,6 +24,7 @@ pub(super) struct Attribute {
 }
 
 impl Attribute {
+    /// Whether a flag is set.
     pub fn has(&self, flag: u32) -> bool {
         self.flags & flag != 0
     }
@@ -30,7 +34,7 @@ impl Attribute {
         if in_range(value) { value } else { 0.0 }
     }
 
-    /// Weights are two 16-bit counts of 1/10000 in the third value.
+    /// Weight of the key's right tangent. Weights are two 16-bit counts of 1/10000 in the third value.
     pub fn right_weight(&self) -> f64 {
         let weight = f64::from(self.data[2] & 0xffff) * 1e-4;
         if self.has(WEIGHTED_RIGHT) {
@@ -40,6 +44,7 @@ impl Attribute {
         }
     }
 
+    /// Weight of the next key's left tangent.
     pub fn next_left_weight(&self) -> f64 {
         let weight = f64::from(self.data[2] >> 16) * 1e-4;
         if self.has(WEIGHTED_NEXT_LEFT) && !self.has(TANGENT_TCB) {
@@ -49,7 +54,7 @@ impl Attribute {
         }
     }
 
-    /// Slope of the next key's left side, in units per second, or its bias if that key is automatic.
+    /// Slope on the left of the next key, units per second, or the next key's bias if it is automatic.
     fn next_left(&self) -> f64 {
         if self.has(TANGENT_TCB) {
             0.0
@@ -64,6 +69,7 @@ impl Attribute {
 pub(super) struct Step {
     /// Seconds, above 0.
     pub time: f64,
+    /// Change of value.
     pub rise: f64,
     /// Weight of the key's tangent on this side.
     pub weight: f64,
@@ -75,7 +81,8 @@ impl Step {
     }
 }
 
-/// Slopes on the left and on the right of a cubic key, in units per second.
+/// Slopes on the left and on the right of a cubic key, units per second, given the steps to its neighbours and what the key
+/// before and the key itself state.
 pub(super) fn slopes(
     before: Option<Step>,
     after: Option<Step>,
@@ -105,7 +112,8 @@ fn pair(slope: f64) -> (f64, f64) {
     (slope, slope)
 }
 
-/// Kochanek and Bartels 1984; a missing neighbour's share goes to the other one.
+/// Slopes by tension, continuity and bias (Kochanek and Bartels, "Interpolating splines with local tension, continuity, and bias
+/// control", 1984). A missing neighbour's share goes to the other one.
 fn kochanek_bartels(before: Option<Step>, after: Option<Step>, own: Attribute) -> (f64, f64) {
     let [tension, continuity, bias] = [0, 1, 2].map(|i| own.real(i));
     let share = if before.is_some() && after.is_some() {
@@ -123,7 +131,8 @@ fn kochanek_bartels(before: Option<Step>, after: Option<Step>, own: Attribute) -
     )
 }
 
-/// Automatic slope of a key between two others. `bias` is in percent, towards the segment after where positive.
+/// Automatic slope of a key between two others: the slope of the chord between the neighbours, or its mean with that of the
+/// parabola through the three keys. `bias` is in percent; a positive one draws the slope towards the segment after.
 fn automatic(before: Step, after: Step, bias: f64, own: Attribute) -> f64 {
     if own.has(CLAMP) && (before.rise == 0.0 || after.rise == 0.0) {
         return 0.0;
@@ -144,6 +153,7 @@ fn automatic(before: Step, after: Step, bias: f64, own: Attribute) -> f64 {
     }
 }
 
+/// The slope with its bias: drawn towards one of the segments, and steeper beyond 500 percent.
 fn biased(slope: f64, before: Step, after: Step, bias: f64) -> f64 {
     let weight = bias.abs() / 100.0;
     if weight <= 1e-4 {
@@ -162,13 +172,13 @@ fn biased(slope: f64, before: Step, after: Step, bias: f64) -> f64 {
     slope + (target - slope) * weight + steepening(bias).copysign(towards)
 }
 
-/// Bias beyond 500 percent steepens by an absolute amount. Not below 0.
+/// How much bias beyond 500 percent steepens a slope, units per second: 40 (bias / 100 − 5)².
 fn steepening(bias: f64) -> f64 {
     let beyond = (bias.abs() / 100.0 - 5.0).max(0.0);
     40.0 * beyond * beyond
 }
 
-/// Keeps both Bezier handles between the values of the key and of its neighbours.
+/// The slope limited so that both Bézier handles stay between the values of the key and of its neighbours.
 fn clamped(slope: f64, before: Step, after: Step) -> f64 {
     let sign = 1f64.copysign(slope);
     let limit = |step: Step| {

@@ -16,16 +16,17 @@ use std::cell::Cell;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::iter::repeat;
 
-/// A file and the place up to which it is read.
+/// A file, and the place up to which `fbxcel` has read it.
 #[derive(Debug)]
 pub(super) struct Tape<'a> {
     file: &'a [u8],
-    /// What `fbxcel` reads in place of the file, byte for byte.
+    /// What `fbxcel` reads instead of the file, byte for byte: see `scan`.
     readable: Vec<u8>,
     at: Cell<usize>,
 }
 
 impl<'a> Tape<'a> {
+    /// A file from its start.
     pub fn new(file: &'a [u8], readable: Vec<u8>) -> Self {
         Self {
             file,
@@ -34,6 +35,7 @@ impl<'a> Tape<'a> {
         }
     }
 
+    /// The place of the next byte.
     pub fn place(&self) -> usize {
         self.at.get()
     }
@@ -50,12 +52,13 @@ impl<'a> Tape<'a> {
                     let siblings = open.last_mut().map(|parent| &mut parent.children);
                     siblings.unwrap_or(&mut records).push(done);
                 }
-                // Whatever the footer says, all records are there.
+                // All records have been read, so it doesn't matter whether the footer is right.
                 Event::EndFbx(_) => return Ok(records),
             }
         }
     }
 
+    /// The record that begins with `node`, without its children.
     fn element(&self, node: StartNode<'_, &Self>) -> Result<Element<'a>> {
         let name = self.behind(node.name().len())?;
         let values = node.attributes().into_iter(repeat(Loader { tape: self }));
@@ -106,7 +109,7 @@ impl Seek for &Tape<'_> {
     }
 }
 
-/// Takes any attribute as a value. Texts and arrays it leaves unread; `fbxcel` then skips them.
+/// Makes a value of any attribute. It leaves texts and arrays unread, and `fbxcel` then skips them.
 #[derive(Clone, Copy, Debug)]
 struct Loader<'t, 'a> {
     tape: &'t Tape<'a>,
@@ -118,7 +121,7 @@ impl<'a> Loader<'_, 'a> {
         Ok(Value::Text(self.tape.ahead(len)?))
     }
 
-    /// The header is read anew from the file, as `fbxcel` sees another encoding.
+    /// An array. Its header is read again from the file, because the encoding that `fbxcel` sees isn't the file's.
     fn array(self, kind: Kind, count: usize) -> Result<Value<'a>> {
         let header = self.tape.behind(ARRAY_HEADER)?;
         let len = word(&header[8..]) as usize;
@@ -138,7 +141,7 @@ impl<'a> LoadAttribute for Loader<'_, 'a> {
         "any value".into()
     }
 
-    /// The byte itself: some exporters write letters as this type.
+    /// The byte itself, because some exporters write letters as this type.
     fn load_bool(self, _: bool) -> Result<Value<'a>> {
         let byte = self.tape.behind(1)?;
         Ok(Value::Int(i64::from(byte[0])))

@@ -1,4 +1,4 @@
-//! From a node's transform properties to its place in the world, as FBX composes them.
+//! From a node's transform properties to its world transform, as FBX composes them.
 
 use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3};
 
@@ -29,6 +29,7 @@ impl Property {
         ("ScalingPivot", Self::ScalingPivot),
     ];
 
+    /// The property that a connection names.
     pub fn named(name: &[u8]) -> Option<Self> {
         Self::ALL
             .iter()
@@ -37,31 +38,34 @@ impl Property {
     }
 }
 
-/// Values of all transform properties; rotations are Euler angles in degrees.
+/// Values of all transform properties: rotations are Euler angles in degrees, positions are in the file's units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pose([Vector3<f64>; 9]);
 
 impl Pose {
+    /// Scale 1, everything else 0.
     pub fn identity() -> Self {
         let mut pose = Self([Vector3::zeros(); 9]);
         *pose.at_mut(Property::Scaling) = Vector3::repeat(1.0);
         pose
     }
 
+    /// The value of a property.
     pub fn at(&self, property: Property) -> Vector3<f64> {
         self.0[property as usize]
     }
 
+    /// The value of a property, to be changed.
     pub fn at_mut(&mut self, property: Property) -> &mut Vector3<f64> {
         &mut self.0[property as usize]
     }
 }
 
-/// The three axes in the order in which Euler angles turn about them.
+/// The axes (0 to 2) in the order in which Euler angles turn about them.
 pub(super) type Order = [usize; 3];
 pub(super) const XYZ: Order = [0, 1, 2];
 
-/// Order of the file's `RotationOrder`. The spheric order differs from XYZ only in how software interpolates.
+/// The order that `RotationOrder` means. The spheric order, 6, is XYZ: it differs only in how software interpolates.
 pub(super) fn rotation_order(code: i64) -> Order {
     match code {
         1 => [0, 2, 1],
@@ -73,23 +77,26 @@ pub(super) fn rotation_order(code: i64) -> Order {
     }
 }
 
-/// What of its parent's scale a node inherits, by FBX's names: R and S the parent's, r and s its own.
+/// Which part of its parent's scale a node inherits, by FBX's names: R and S are the parent's rotation and scale, r and s the
+/// node's own, multiplied in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Inherit {
-    /// The parent's scale works along the node's own axes, without shear.
+    /// The parent's scale acts along the node's own axes, without shear.
     RrSs,
-    /// Ordinary matrix product.
+    /// The ordinary matrix product.
     RSrs,
-    /// The parent's own scale is left out.
+    /// The parent's own scale is left out; what the parent inherited stays.
     Rrs,
 }
 
 /// How a node's properties become its transform.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
+    /// Order of its Euler angles.
     pub order: Order,
-    /// Pre- and post-rotation and the rotation order count.
+    /// Whether pre- and post-rotation and the rotation order count.
     pub rotation_space: bool,
+    /// Which scale it inherits.
     pub inherit: Inherit,
 }
 
@@ -100,6 +107,7 @@ pub(super) fn from_euler(degrees: Vector3<f64>, order: Order) -> Matrix3<f64> {
     })
 }
 
+/// Rotation about a coordinate axis, exact for 0: most angles of a rig are, and then nothing is rounded.
 fn about(axis: usize, degrees: f64) -> Matrix3<f64> {
     let mut m = Matrix3::identity();
     if degrees != 0.0 {
@@ -113,7 +121,11 @@ fn about(axis: usize, degrees: f64) -> Matrix3<f64> {
     m
 }
 
-/// Euler angles in degrees of a rotation; the middle one within ±90°.
+/// Euler angles of a rotation, degrees; the middle one within ±90°.
+///
+/// With axes i, j, k the rotation is R_k R_j R_i. Its entry (k, i) is −sin of the middle angle for even orders (i, j, k = x, y, z
+/// and its shifts) and +sin for odd ones; the two others follow from the rest of column i and row k. At ±90°, to a billionth
+/// of the sine, only their sum or difference is defined, and the first angle is 0.
 pub(super) fn to_euler(m: &Matrix3<f64>, order: Order) -> Vector3<f64> {
     let [i, j, k] = order;
     let parity = if (i + 1) % 3 == j { 1.0 } else { -1.0 };
@@ -129,22 +141,28 @@ pub(super) fn to_euler(m: &Matrix3<f64>, order: Order) -> Vector3<f64> {
     angles.map(f64::to_degrees)
 }
 
-/// The rotation from `a` to `b`, `weight` of the shorter way.
+/// The rotation a fraction `weight` of the way from `a` to `b`, the shorter way round.
 pub(super) fn slerp(a: &Matrix3<f64>, b: &Matrix3<f64>, weight: f64) -> Matrix3<f64> {
     let way = Rotation3::from_matrix_unchecked(a.transpose() * b);
-    // A quaternion's axis stays exact near 180°, where that of a matrix doesn't.
+    // The axis of a quaternion is exact near 180°, where that of a matrix isn't.
     let step = UnitQuaternion::from_rotation_matrix(&way).powf(weight);
     a * step.to_rotation_matrix().matrix()
 }
 
-/// A node in its parent: translate, rotate, scale.
+/// The transform of a node in its parent: scale, then rotate, then translate.
 pub(super) struct Local {
+    /// In the file's units.
     pub translation: Vector3<f64>,
+    /// Parent from node, without scale.
     pub rotation: Matrix3<f64>,
+    /// Along the node's axes.
     pub scale: Vector3<f64>,
 }
 
-/// `T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹`, the chain of FBX's documentation.
+/// The transform of a node's properties: `T·Roff·Rp·Rpre·R·Rpost⁻¹·Rp⁻¹·Soff·Sp·S·Sp⁻¹`, the chain of the FBX SDK's documentation
+/// ("Computing transformation matrices"). All factors but R, Rpre, Rpost and S are translations, so that its linear part is
+/// Rpre·R·Rpost⁻¹·S. Its translation follows by applying the chain to the origin, from the right: −Sp, scaled, + Sp + Soff − Rp,
+/// rotated, + Rp + Roff + T. Pre- and post-rotation are always in XYZ order.
 fn local(pose: &Pose, rules: &Rules) -> Local {
     use Property::*;
     let rotation = if rules.rotation_space {
@@ -166,9 +184,10 @@ fn local(pose: &Pose, rules: &Rules) -> Local {
     }
 }
 
-/// A node in the world: the linear part is `frame` times the diagonal of `scale`.
+/// The world transform of a node, in the file's axes and units. Its linear part is `frame` times the diagonal of `scale`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct World {
+    /// A rotation, unless an ancestor shears.
     frame: Matrix3<f64>,
     scale: Vector3<f64>,
     /// The part of `scale` that comes from the ancestors.
@@ -177,6 +196,7 @@ pub(super) struct World {
 }
 
 impl World {
+    /// The transform of the scene itself.
     pub fn root() -> Self {
         let one = Vector3::repeat(1.0);
         Self {
@@ -187,11 +207,12 @@ impl World {
         }
     }
 
+    /// The world transform of a child with these properties.
     pub fn child(&self, pose: &Pose, rules: &Rules) -> Self {
         self.below(&local(pose, rules), rules.inherit)
     }
 
-    /// The world transform of a child that stands in this node by `local`.
+    /// The world transform of a child whose transform in this node is `local`.
     pub fn below(&self, local: &Local, inherit: Inherit) -> Self {
         let (frame, received) = match inherit {
             Inherit::RSrs => (self.linear(), Vector3::repeat(1.0)),
@@ -214,6 +235,7 @@ impl World {
         linear
     }
 
+    /// As a matrix.
     pub fn matrix(&self) -> Matrix4<f64> {
         let mut matrix = self.linear().to_homogeneous();
         matrix

@@ -53,25 +53,25 @@ fn bone(slot: Slot) -> String {
 
 /// Fills slots that the file leaves out with `guesses`, where they don't contradict what it states.
 pub(super) fn supplement(tree: &Tree, found: &mut HumanoidMap, guesses: HumanoidMap) {
-    let told = found.clone();
+    let stated = found.clone();
     for (slot, guess) in guesses.matches {
-        let is_free = told.matches.values().all(|m| m.joint != guess.joint);
+        let is_free = stated.matches.values().all(|m| m.joint != guess.joint);
         // The file states the trunk as a whole: a bone that it leaves out isn't there.
-        let is_open = told.joint(slot).is_none() && !is_trunk(slot);
-        if is_free && is_open && fits(tree, &told, slot, guess.joint) {
+        let is_open = stated.joint(slot).is_none() && !is_trunk(slot);
+        if is_free && is_open && fits(tree, &stated, slot, guess.joint) {
             found.matches.insert(slot, guess);
         }
     }
 }
 
 /// Whether a joint is between those that the file states before and after it in its chain.
-fn fits(tree: &Tree, told: &HumanoidMap, slot: Slot, joint: usize) -> bool {
+fn fits(tree: &Tree, stated: &HumanoidMap, slot: Slot, joint: usize) -> bool {
     let chains = CHAINS.iter().filter_map(|chain| {
         let at = chain.iter().position(|s| *s == slot)?;
         Some((&chain[..at], &chain[at + 1..]))
     });
     let joints =
-        |slots: &[Slot]| -> Vec<usize> { slots.iter().filter_map(|s| told.joint(*s)).collect() };
+        |slots: &[Slot]| -> Vec<usize> { slots.iter().filter_map(|s| stated.joint(*s)).collect() };
     chains.into_iter().all(|(before, after)| {
         joints(before).into_iter().all(|j| tree.is_above(j, joint))
             && joints(after).into_iter().all(|j| tree.is_above(joint, j))

@@ -16,7 +16,7 @@ fn json_of(path: &std::path::Path) -> Value {
     serde_json::from_slice(&bytes[20..20 + length as usize]).expect("JSON")
 }
 
-/// Names of the nodes that a file calls by bone.
+/// Bones that a file names, and the names of their nodes.
 fn told(file: &Value) -> Vec<(String, String)> {
     let extensions = file["extensions"].as_object().expect("extensions");
     let bones = extensions.values().map(|e| &e["humanoid"]["humanBones"]);
@@ -83,7 +83,7 @@ fn vrm_files_map_as_they_say() {
     }
 }
 
-/// Bone, parent, and place from the parent in a T-pose that faces +Z with Y up, left to +X: VRM's way.
+/// Bone, index of the parent, and position in the parent, in a T-pose that faces +Z with Y up and left along +X, as in VRM.
 const FIGURE: [(&str, usize, [f64; 3]); 24] = [
     ("hips", 0, [0.0, 0.95, 0.0]),
     ("spine", 0, [0.0, 0.1, 0.0]),
@@ -111,7 +111,8 @@ const FIGURE: [(&str, usize, [f64; 3]); 24] = [
     ("", 17, [0.0, -0.05, 0.12]),
 ];
 
-/// The figure in a file whose names say nothing, which moves its left arm; `extensions` from each bone's node.
+/// The figure in a file whose names of nodes say nothing and whose take moves the left arm. `extensions` makes the file's
+/// extensions, given the node of each bone.
 fn nameless(extensions: impl Fn(&dyn Fn(&str) -> Option<usize>) -> Value) -> String {
     let node = |(n, (_, _, place)): (usize, &(&str, usize, [f64; 3]))| {
         let below = (1..FIGURE.len()).filter(|&c| FIGURE[c].1 == n);
@@ -155,7 +156,7 @@ fn read(text: &str) -> Clip {
     import::read(text.as_bytes(), "a.vrm", None, &Options::default()).expect("it imports")
 }
 
-/// The clips of the figure told in each of the three ways.
+/// Clips of the figure, with its bones named in each of the three ways.
 fn clips() -> [Clip; 3] {
     let named = |of: &dyn Fn(&str) -> Option<usize>| -> Value {
         let bones = bones().map(|bone| (bone.to_owned(), json!({ "node": of(bone) })));

@@ -1,4 +1,4 @@
-//! glTF files whose motion is whole, with faults and oddities beside it; and containers that lie.
+//! glTF files with sound motion and faults elsewhere, and GLB containers with wrong lengths.
 
 use super::gltf_made::{base64, synthetic};
 use mimic::clip::Clip;
