@@ -4,7 +4,7 @@
 //! their ratios mean something on a machine that does other work too.
 
 use mimic::learn::{
-    ActWorkspace, Activation, Batch, Config, FrozenNormalizer, Learner, Normalizer, PolicySpec,
+    ActWorkspace, Activation, Batch, FrozenNormalizer, Learner, Normalizer, PolicySpec, PpoConfig,
     fill_normal,
 };
 use rand_chacha::ChaCha8Rng;
@@ -87,10 +87,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         hidden: vec![256, 128],
         activation: Activation::Relu,
     };
-    let config = Config {
+    let config = PpoConfig {
         epochs: 1,
         target_kl: None,
-        ..Config::default()
+        ..PpoConfig::default()
     };
     let observations = normal(SAMPLES * OBSERVATION, &mut rng);
     let mut normalizer = Normalizer::new(OBSERVATION);
@@ -101,7 +101,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()?;
-        let config = Config {
+        let config = PpoConfig {
             shards,
             ..config.clone()
         };

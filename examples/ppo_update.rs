@@ -3,7 +3,7 @@
 //! `cargo run --release --example ppo_update -- FOLDER` writes `f64.safetensors` and `f32.safetensors`.
 
 use mimic::learn::{
-    ActWorkspace, Activation, Batch, Config, Learner, PolicySpec, Scalar, fill_normal, shuffled,
+    ActWorkspace, Activation, Batch, Learner, PolicySpec, PpoConfig, Scalar, fill_normal, shuffled,
 };
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -14,8 +14,8 @@ use std::path::Path;
 
 const SAMPLES: usize = 600;
 
-fn config() -> Config {
-    Config {
+fn config() -> PpoConfig {
+    PpoConfig {
         epochs: 2,
         minibatch: 150,
         learning_rate: 1e-3,
@@ -25,7 +25,7 @@ fn config() -> Config {
         action_bound: 0.1,
         action_bound_coefficient: 0.5,
         max_gradient_norm: 0.3,
-        ..Config::default()
+        ..PpoConfig::default()
     }
 }
 

@@ -35,6 +35,7 @@ pub mod import;
 pub mod learn;
 pub mod motion;
 pub mod retarget;
+pub mod run;
 pub mod schema;
 pub mod sim;
 pub mod skeleton;

@@ -2,12 +2,14 @@
 
 use mimic::clip::LoopMode;
 use mimic::import;
-use mimic::learn::{Config, Plan, Run, Trainer};
+use mimic::learn::{PpoConfig, Trainer};
 use mimic::motion::Motion;
 use mimic::retarget;
+use mimic::run::{Plan, Run};
 use mimic::skeleton::Skeleton;
-use mimic::task::{Setting, Stage};
+use mimic::task::{CharacterModel, ImitationSettings, TaskSettings};
 use std::path::Path;
+use std::sync::Arc;
 
 fn skeleton() -> Skeleton {
     Skeleton::load("humanoid").expect("the built-in humanoid loads")
@@ -33,12 +35,13 @@ fn both() -> Vec<Motion> {
 
 fn tiny() -> Plan {
     Plan {
-        task: Setting {
+        task: ImitationSettings {
             adaptive_starts: 0.5,
             transitions_s: Some([0.2, 0.4]),
-            ..Setting::default()
-        },
-        ppo: Config {
+            ..ImitationSettings::default()
+        }
+        .into(),
+        ppo: PpoConfig {
             minibatch: 64,
             ..Plan::default().ppo
         },
@@ -49,6 +52,20 @@ fn tiny() -> Plan {
         round: 2,
         samples: 12 * 16 * 6,
         ..Plan::default()
+    }
+}
+
+fn trainer(plan: &Plan, motions: &[Motion]) -> Trainer {
+    let model = CharacterModel::new(skeleton()).expect("a character");
+    let task = plan.task.build(Arc::new(model), motions).expect("a task");
+    Trainer::new(plan.trainer(), task).expect("a trainer")
+}
+
+/// The settings of a plan's task.
+fn task(plan: &mut Plan) -> &mut ImitationSettings {
+    match &mut plan.task {
+        TaskSettings::Imitate(settings) => settings,
+        other => panic!("the plan is for {}", other.name()),
     }
 }
 
@@ -77,9 +94,7 @@ fn on_threads(threads: usize, work: impl FnOnce() -> Vec<u32> + Send) -> Vec<u32
 fn the_same_seed_gives_the_same_bits_at_any_number_of_threads() {
     let train = |seed| {
         let plan = Plan { seed, ..tiny() };
-        let mut trainer = Trainer::new(plan, Stage::new(skeleton()).expect("a stage"), &both())
-            .expect("a trainer");
-        learned(&mut trainer, 4)
+        learned(&mut trainer(&plan, &both()), 4)
     };
     let one = on_threads(1, || train(7));
     assert_eq!(
@@ -99,7 +114,7 @@ fn the_same_seed_gives_the_same_bits_at_any_number_of_threads() {
 fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let whole =
-        Run::create(&folder.path().join("whole"), tiny(), skeleton(), both()).expect("a run");
+        Run::create(folder.path().join("whole"), tiny(), skeleton(), both()).expect("a run");
     let unbroken = learned(&mut whole.trainer().expect("a trainer"), 6);
 
     let path = folder.path().join("broken");
@@ -131,16 +146,15 @@ fn a_killed_run_goes_on_with_the_bits_of_an_unbroken_one() {
 fn transitions_go_on_where_a_motion_ends() {
     let ends = |transitions_s| {
         let mut plan = tiny();
-        plan.task.transitions_s = transitions_s;
         plan.horizon = 64;
-        plan.task.terminations.fall = false;
-        plan.task.terminations.distance = None;
+        task(&mut plan).transitions_s = transitions_s;
+        task(&mut plan).terminations.fall = false;
+        task(&mut plan).terminations.distance = None;
         let mut motions = both();
         motions
             .iter_mut()
             .for_each(|m| m.loop_mode = LoopMode::Clamp);
-        let stage = Stage::new(skeleton()).expect("a stage");
-        let mut trainer = Trainer::new(plan, stage, &motions).expect("a trainer");
+        let mut trainer = trainer(&plan, &motions);
         trainer.iterate().expect("training stays finite").episodes
     };
     assert!(ends(None) > 0);
@@ -167,10 +181,10 @@ fn what_cannot_be_trained_is_refused_before_a_folder_appears() {
     let path = folder.path().join("run");
     type Break = fn(&mut Plan);
     let broken: [(Break, &str); 6] = [
-        (|plan| plan.task.physics.control_hz = 0.0, "control_hz"),
-        (|plan| plan.task.physics.substeps = 0, "substeps"),
-        (|plan| plan.task.episode_s = f64::NAN, "episode_s"),
-        (|plan| plan.task.rewards.pose = -1.0, "reward weight"),
+        (|plan| task(plan).physics.control_hz = 0.0, "control_hz"),
+        (|plan| task(plan).physics.substeps = 0, "substeps"),
+        (|plan| task(plan).episode_s = f64::NAN, "episode_s"),
+        (|plan| task(plan).rewards.pose = -1.0, "reward weight"),
         (|plan| plan.final_std = 0.0, "final_std"),
         (|plan| plan.environments = 0, "environments"),
     ];

@@ -1,6 +1,7 @@
 //! Finding inputs: by path, by name in the library folder or in `runs/`, or the newest one.
 
 use crate::failure::{Failure, Outcome};
+use mimic::run::files;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -20,8 +21,6 @@ pub const SOURCES: [&str; 9] = [
 
 /// The folder of training runs.
 pub const RUNS: &str = "runs";
-/// The file that makes a folder a run: it is written first.
-pub const RUN_CONFIG: &str = "config.json";
 
 /// How many names an error message lists.
 const NAMES_SHOWN: usize = 8;
@@ -105,7 +104,7 @@ pub fn existing_run(wanted: &Path) -> Option<PathBuf> {
 
 /// Whether a folder holds a run.
 pub fn is_run(path: &Path) -> bool {
-    path.join(RUN_CONFIG).is_file()
+    path.join(files::CONFIG).is_file()
 }
 
 /// The run in `runs/` that learned last.
@@ -116,7 +115,7 @@ pub fn newest_run() -> Option<PathBuf> {
 
 /// When a run learned last; before its first checkpoint, when it was made.
 fn run_time(run: &Path) -> Option<SystemTime> {
-    let files = ["checkpoint.safetensors", "metrics.jsonl", RUN_CONFIG];
+    let files = [files::CHECKPOINT, files::METRICS, files::CONFIG];
     files.iter().find_map(|file| modified(&run.join(file)))
 }
 

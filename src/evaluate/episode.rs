@@ -1,253 +1,116 @@
-//! One deterministic episode, kept frame by frame for metrics and replay.
+//! Deterministic episodes of an agent.
 
-use crate::clip::LoopMode;
-use crate::learn::{LearnError, Memory, Performer};
-use crate::sim::LinkState;
+use super::agent::{Agent, EvaluateError};
 use crate::task::{
-    Dynamics, Failure, Imitate, Outcome, Perturbations, Reference, Sample, Setting, Stage, Step,
-    Terminations, Terms,
+    Environment, Episode, EpisodeStart, Input, Outcome, Purpose, StartState, Step, Task, frame,
+    step, step_together,
 };
-use nalgebra::Vector3;
 
-/// Mean distance of the bodies from their reference beyond which an episode has failed, metres.
-const LOST_M: f32 = 0.5;
-
-/// Agent and reference at the end of one control step.
-#[derive(Clone, Debug)]
-pub struct Frame {
-    /// Time in the reference, seconds.
-    pub time: f64,
-    pub agent: Vec<LinkState>,
-    pub reference: Sample,
-    pub dynamics: Dynamics,
-    /// Per contact link of the motion: whether the agent presses on the ground with it.
-    pub contacts: Vec<bool>,
-    pub terms: Terms,
-    /// In (0, 1].
-    pub reward: f32,
-    /// Impulse of the shove on the trunk that the step began with, N·s, world axes.
-    pub shove: Option<Vector3<f32>>,
-}
-
-/// How an episode begins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
-    /// In the reference's own state at this share of the motion.
-    At(f64),
-    /// In the rest pose, standing still, at the reference's first frame.
-    Rest,
-}
-
-/// An episode.
-#[derive(Clone, Debug)]
-pub struct Trace {
-    pub start: Start,
-    pub control_hz: f64,
-    pub frames: Vec<Frame>,
-    /// Steps of an episode without failure; in a sequence those of the motions that were begun.
-    pub possible: usize,
-    /// Frames before a failure; with one, the last frame shows it.
-    pub survived: usize,
-    /// Largest angular momentum of the reference, kg·m²/s.
-    pub largest_momentum: f32,
-    pub failure: Option<Failure>,
-    /// Links that the motion puts on the ground, in the order of [`Frame::contacts`].
-    pub contact_links: Vec<usize>,
-}
-
-/// How an episode begins, and by which ranges and which seed it is disturbed.
-pub type Opening = (Start, Option<(Perturbations, u64)>);
-
-/// One of the episodes that are played together.
-struct Playing {
-    env: Imitate,
-    trace: Trace,
+/// One of the episodes that run together.
+struct Running {
+    environment: Box<dyn Environment>,
+    episode: Episode,
     outcome: Outcome,
 }
 
-/// Plays reference number `which` once for each of `openings`, for `seconds` or to its end.
+/// Performs an episode for each of `starts`: a case that goes on for ever for `seconds`, any other to its end.
 ///
-/// An episode fails by a fall, or when the bodies are 0.5 m from their reference in the mean, whatever rules the policy
-/// was trained under; where the reference follows the agent along the ground, from there. Up to [`LANES`](crate::sim::LANES) episodes take little longer than one.
+/// They end by the rules of [`Purpose::Evaluation`], whatever rules the agent was trained under. Up to
+/// [`LANES`](crate::sim::LANES) episodes take little longer than one.
 ///
 /// # Errors
-/// A task of another shape than the policy's.
-pub fn play(
-    performer: &Performer,
-    which: usize,
-    openings: &[Opening],
+/// A task of another shape than the agent's.
+pub fn perform<A: Agent>(
+    agent: &A,
+    starts: &[EpisodeStart],
     seconds: f64,
-) -> Result<Vec<Trace>, LearnError> {
-    let open = |opening| Playing::new(performer, which, opening, seconds);
-    let mut all: Vec<Playing> = openings.iter().map(open).collect();
-    let (mut memory, mut actions) = (Memory::default(), Vec::new());
+) -> Result<Vec<Episode>, EvaluateError> {
+    let task = agent.task();
+    let start = |start: &EpisodeStart| Running::new(task.as_ref(), start, seconds);
+    let mut all: Vec<Running> = starts.iter().map(start).collect();
+    let (mut memory, mut actions) = (A::Memory::default(), Vec::new());
     loop {
-        let running = all.iter_mut().filter(|p| p.outcome == Outcome::Running);
-        let mut running: Vec<&mut Playing> = running.collect();
+        let running = all.iter_mut().filter(|r| r.outcome == Outcome::Running);
+        let mut running: Vec<&mut Running> = running.collect();
         if running.is_empty() {
-            return Ok(all.into_iter().map(|playing| playing.trace).collect());
+            return Ok(all.into_iter().map(|running| running.episode).collect());
         }
         actions.clear();
-        for playing in &running {
-            actions.extend_from_slice(performer.act(&playing.env, &mut memory)?);
+        for running in &running {
+            let environment = running.environment.as_ref();
+            actions.extend_from_slice(agent.act(environment, &mut memory)?);
         }
-        let agents = running.iter_mut().map(|playing| &mut playing.env);
-        let steps = Imitate::step_together(agents, &actions);
-        for (playing, step) in running.into_iter().zip(steps) {
-            playing.outcome = playing.trace.keep(performer, &playing.env, &step);
+        let environments = running
+            .iter_mut()
+            .map(|r| (r.environment.as_mut() as _, None));
+        let steps = step_together(&mut environments.collect::<Vec<_>>(), &actions);
+        for (running, step) in running.into_iter().zip(steps) {
+            running.outcome = step.outcome;
+            let environment = running.environment.as_ref();
+            keep(&mut running.episode, task.as_ref(), environment, &step);
         }
     }
 }
 
-impl Playing {
-    fn new(
-        performer: &Performer,
-        which: usize,
-        (start, disturbed): &Opening,
-        seconds: f64,
-    ) -> Self {
-        let ranges = disturbed.map_or_else(Perturbations::default, |(ranges, _)| ranges);
-        let seconds = episode_s(&performer.references()[which], seconds);
-        let setting = rules(performer, seconds, ranges);
-        let mut env = performer.environment(which, &setting);
-        match start {
-            Start::At(share) => env.reset(share * env.last_start()),
-            Start::Rest => env.reset_at_rest(),
-        }
-        if let Some((_, seed)) = disturbed {
-            env.perturb(*seed);
-        }
-        Playing {
-            trace: Trace::new(performer, which, *start, &env),
-            env,
+impl Running {
+    fn new(task: &dyn Task, start: &EpisodeStart, seconds: f64) -> Self {
+        let mut environment = task.environment(Purpose::Evaluation { seconds });
+        environment.start_at(start);
+        let possible = environment.possible_steps() as usize;
+        Running {
+            episode: Episode::new(*start, task.control_hz(), possible),
+            environment,
             outcome: Outcome::Running,
         }
     }
 }
 
-/// Plays the references of these numbers one after the other, each for `seconds` or to its end, and each from where the
-/// one before has led. It ends early with a failure, as in [`play`]. Gives also how many of them were begun.
+fn keep(episode: &mut Episode, task: &dyn Task, environment: &dyn Environment, step: &Step) {
+    episode.keep(frame(task, environment, step), step.outcome);
+}
+
+/// Performs the cases of these numbers one after the other, each for `seconds` or to its end, and each from where the one
+/// before has led. It ends early with a failure, as in [`perform`]. Gives also how many of the cases were begun.
 ///
 /// # Errors
-/// A task of another shape than the policy's.
-pub fn play_sequence(
-    performer: &Performer,
-    which: &[usize],
+/// A task of another shape than the agent's, or a case that it hasn't.
+pub fn perform_sequence<A: Agent>(
+    agent: &A,
+    cases: &[usize],
     seconds: f64,
-) -> Result<(Trace, usize), LearnError> {
-    let setting = rules(performer, f64::MAX, Perturbations::default());
-    let first = which.first().copied().unwrap_or(0);
-    let mut env = performer.environment(first, &setting);
-    let mut trace = Trace::new(performer, first, Start::At(0.0), &env);
-    trace.possible = 0;
-    let mut memory = Memory::default();
-    for (part, &number) in which.iter().enumerate() {
-        let reference = &performer.references()[number];
+) -> Result<(Episode, usize), EvaluateError> {
+    let task = agent.task();
+    let first = cases.first().copied().unwrap_or(0);
+    let start = EpisodeStart::new(first, StartState::Reference(0.0));
+    let mut environment = task.environment(Purpose::Performance);
+    environment.start_at(&start);
+    let mut episode = Episode::new(start, task.control_hz(), 0);
+    let mut memory = A::Memory::default();
+    let mut advance = |environment: &mut dyn Environment, episode: &mut Episode| {
+        let action = agent.act(environment, &mut memory)?;
+        let step = step(environment, action);
+        keep(episode, task.as_ref(), environment, &step);
+        Ok::<bool, EvaluateError>(episode.failure.is_some())
+    };
+    for (part, &number) in cases.iter().enumerate() {
         if part > 0 {
-            env.lead_to(reference);
+            environment.input(Input::Case(number))?;
         }
-        while env.is_leading() {
-            trace.possible += 1;
-            let step = env.step(performer.act(&env, &mut memory)?);
-            trace.keep(performer, &env, &step);
-            if trace.failure.is_some() {
-                return Ok((trace, part));
+        while environment.is_changing() {
+            episode.possible += 1;
+            if advance(environment.as_mut(), &mut episode)? {
+                return Ok((episode, part));
             }
         }
-        trace.largest_momentum = trace.largest_momentum.max(reference.largest_momentum());
-        let steps = episode_s(reference, seconds) * setting.physics.control_hz;
-        let steps = steps.round().clamp(1.0, env.possible_steps()) as usize;
-        trace.possible += steps;
+        let duration = task.cases()[number].duration_s;
+        let steps = duration.map_or(seconds, |s| s + 1.0) * task.control_hz();
+        let steps = steps.round().clamp(1.0, environment.possible_steps()) as usize;
+        episode.possible += steps;
         for _ in 0..steps {
-            let step = env.step(performer.act(&env, &mut memory)?);
-            trace.keep(performer, &env, &step);
-            if trace.failure.is_some() {
-                return Ok((trace, part + 1));
+            if advance(environment.as_mut(), &mut episode)? {
+                return Ok((episode, part + 1));
             }
         }
     }
-    Ok((trace, which.len()))
-}
-
-/// Length of an episode, with room for the end of a motion that has one.
-fn episode_s(reference: &Reference, seconds: f64) -> f64 {
-    match reference.loop_mode() {
-        LoopMode::Wrap => seconds,
-        LoopMode::Clamp => reference.duration() + 1.0,
-    }
-}
-
-/// The performer's task under the rules of evaluation.
-fn rules(performer: &Performer, episode_s: f64, perturbations: Perturbations) -> Setting {
-    Setting {
-        terminations: Terminations {
-            distance: None,
-            fall: true,
-            reward: None,
-        },
-        episode_s,
-        perturbations,
-        ..*performer.setting()
-    }
-}
-
-impl Trace {
-    fn new(performer: &Performer, which: usize, start: Start, env: &Imitate) -> Self {
-        let reference = &performer.references()[which];
-        Trace {
-            start,
-            control_hz: performer.setting().physics.control_hz,
-            frames: Vec::new(),
-            possible: env.possible_steps() as usize,
-            survived: 0,
-            largest_momentum: reference.largest_momentum(),
-            failure: None,
-            contact_links: reference.contact_links.clone(),
-        }
-    }
-
-    /// Keeps the frame that a step has led to; an episode that failed by its distance goes no further.
-    fn keep(&mut self, performer: &Performer, env: &Imitate, step: &Step) -> Outcome {
-        let mut reference = env.blank();
-        env.wanted(&mut reference);
-        let far = mean_distance(performer.stage(), env.states(), &reference.links) > LOST_M;
-        let outcome = match step.outcome {
-            Outcome::Failed(failure) => Outcome::Failed(failure),
-            _ if far => Outcome::Failed(Failure::Distance),
-            outcome => outcome,
-        };
-        let contact = |&link: &usize| env.contacts()[link];
-        self.frames.push(Frame {
-            time: env.time(),
-            agent: env.states().to_vec(),
-            reference,
-            dynamics: *env.dynamics(),
-            contacts: self.contact_links.iter().map(contact).collect(),
-            terms: step.terms,
-            reward: step.reward,
-            shove: env.shove(),
-        });
-        match outcome {
-            Outcome::Failed(failure) => self.failure = Some(failure),
-            _ => self.survived += 1,
-        }
-        outcome
-    }
-}
-
-/// World positions of all the skeleton's bodies, welded ones included, metres.
-pub(super) fn positions<'a>(
-    stage: &'a Stage,
-    links: &'a [LinkState],
-) -> impl Iterator<Item = Vector3<f32>> + 'a {
-    let bodies = 0..stage.character.bodies.len();
-    bodies.map(|b| stage.character.body_pose(links, b).translation.vector)
-}
-
-fn mean_distance(stage: &Stage, a: &[LinkState], b: &[LinkState]) -> f32 {
-    let sum: f32 = positions(stage, a)
-        .zip(positions(stage, b))
-        .map(|(p, q)| (p - q).norm())
-        .sum();
-    sum / stage.character.bodies.len() as f32
+    Ok((episode, cases.len()))
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// How to learn. Left-out fields take the defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Config {
+pub struct PpoConfig {
     /// Discount γ of later rewards, per control step.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub gamma: f64,
@@ -79,7 +79,7 @@ pub struct Config {
     pub adam: AdamConfig,
 }
 
-impl Default for Config {
+impl Default for PpoConfig {
     fn default() -> Self {
         Self {
             gamma: 0.95,
@@ -109,8 +109,12 @@ impl Default for Config {
     }
 }
 
-impl Config {
-    pub(super) fn check(&self) -> Result<(), LearnError> {
+impl PpoConfig {
+    /// Checks that all numbers are in their ranges.
+    ///
+    /// # Errors
+    /// The first that isn't.
+    pub fn check(&self) -> Result<(), LearnError> {
         let positive = f64::MIN_POSITIVE..=f64::MAX;
         let unit = 0.0..=1.0;
         let least = 0.0..=f64::MAX;

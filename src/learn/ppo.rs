@@ -2,7 +2,7 @@
 
 use super::adam::{Adam, PIECE, Rule};
 use super::batch::{Batch, even_parts, shuffled};
-use super::config::Config;
+use super::config::PpoConfig;
 use super::kernels::{Scalar, add, sum_of_squares};
 use super::policy::{Policy, PolicySpec, entropy};
 use super::stats::{Run, UpdateStats, explained_variance};
@@ -29,7 +29,7 @@ pub struct LearnerState<T> {
 /// values across many orders of magnitude"), which keeps the value loss near 1 at any size of reward.
 #[derive(Clone, Debug)]
 pub struct Learner<T> {
-    config: Config,
+    config: PpoConfig,
     policy: Policy,
     state: LearnerState<T>,
     shards: Vec<Shard<T>>,
@@ -40,7 +40,11 @@ pub struct Learner<T> {
 }
 
 impl<T: Scalar> Learner<T> {
-    pub fn new(config: Config, spec: PolicySpec, rng: &mut ChaCha8Rng) -> Result<Self, LearnError> {
+    pub fn new(
+        config: PpoConfig,
+        spec: PolicySpec,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Self, LearnError> {
         config.check()?;
         let policy = Policy::new(spec.clone())?;
         let parameters = policy.initialise(config.initial_std, rng);
@@ -80,7 +84,7 @@ impl<T: Scalar> Learner<T> {
         Ok(())
     }
 
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &PpoConfig {
         &self.config
     }
 

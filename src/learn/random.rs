@@ -2,7 +2,7 @@
 //! same numbers.
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::SeedableRng;
 
 /// The random stream `number` of a seed, at its `round`th part.
 pub(super) fn stream(seed: u64, number: u64, round: u64) -> ChaCha8Rng {
@@ -11,9 +11,4 @@ pub(super) fn stream(seed: u64, number: u64, round: u64) -> ChaCha8Rng {
     // Far more numbers than one round can use.
     rng.set_word_pos(u128::from(round) << 40);
     rng
-}
-
-/// Uniform in [0, 1), from the upper 53 bits.
-pub(super) fn uniform(rng: &mut ChaCha8Rng) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }

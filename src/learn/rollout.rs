@@ -1,22 +1,23 @@
 //! Environments acting under the current policy, in groups that share one network call per step.
 //!
-//! A group is the unit of parallel work. Which environments it holds depends on the configuration alone, never on
-//! the number of threads, and every environment has its own random stream: so the samples are the same everywhere.
+//! A group is the unit of parallel work. Which environments it holds depends on the settings alone, never on the number of
+//! threads, and every environment has its own random stream: so the samples are the same everywhere.
 
-use super::random::{stream, uniform};
-use super::starts::{Place, Starts, Tally};
+use super::random::stream;
 use super::{ActWorkspace, FrozenNormalizer, LearnError, Policy, StepEnd, fill_normal};
-use crate::task::{Imitate, Outcome, Reference, Setting, Stage, TERM_NAMES};
+use crate::task::{
+    Draws, Environment, Outcome, Purpose, StartDistribution, Step, Stepping, Tally, Task, size,
+    step_together,
+};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::sync::Arc;
+use rand_chacha::rand_core::SeedableRng;
 
 /// What the environments of a group act with.
 pub(super) struct Actor<'a> {
     pub policy: &'a Policy,
     pub parameters: &'a [f32],
     pub normalizer: &'a FrozenNormalizer<f32>,
-    pub starts: &'a Starts,
+    pub starts: &'a StartDistribution,
 }
 
 /// Samples of one iteration; `[steps, environments]` row-major, observations and actions a row more.
@@ -35,24 +36,21 @@ pub(super) struct Buffer {
     /// `[environments]`.
     pub next_values: Vec<f32>,
     /// Every episode that ended.
-    pub episodes: Vec<Episode>,
-    /// By the bins of [`Starts`].
+    pub episodes: Vec<EpisodeTotals>,
+    /// By the bins of the [`StartDistribution`].
     pub tally: Tally,
-    /// Sums over all steps, in the order of [`TERM_NAMES`].
-    pub terms: [f64; TERM_NAMES.len()],
+    /// Sums over all steps, one per reward term of the task.
+    pub terms: Vec<f64>,
 }
 
 impl Buffer {
-    fn clear(&mut self, bins: usize) {
+    /// Empties the buffer for a task of so many start bins and reward terms.
+    fn clear(&mut self, bins: usize, terms: usize) {
         for values in [
             &mut self.raw,
             &mut self.observations,
             &mut self.actions,
             &mut self.log_probs,
-        ] {
-            values.clear();
-        }
-        for values in [
             &mut self.values,
             &mut self.rewards,
             &mut self.final_values,
@@ -63,13 +61,14 @@ impl Buffer {
         self.ends.clear();
         self.episodes.clear();
         self.tally.clear(bins);
-        self.terms = [0.0; TERM_NAMES.len()];
+        self.terms.clear();
+        self.terms.resize(terms, 0.0);
     }
 }
 
 /// How an episode went.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Episode {
+pub(super) struct EpisodeTotals {
     /// Sum of rewards.
     pub reward: f32,
     pub steps: u32,
@@ -77,24 +76,18 @@ pub(super) struct Episode {
     pub possible: f64,
 }
 
-/// One environment, its random stream and its running episode.
-struct Player {
-    env: Imitate,
-    /// Which reference it imitates, and which one it is led to.
-    motion: usize,
-    upcoming: usize,
+/// One environment of a group, its random stream and its running episode.
+struct Member {
+    environment: Box<dyn Environment>,
     number: u64,
     rng: ChaCha8Rng,
-    episode: Episode,
-    /// Seconds of the episode at which another motion follows.
-    next_change: f64,
+    totals: EpisodeTotals,
 }
 
 /// Environments that step together.
 pub(super) struct Group {
-    players: Vec<Player>,
-    references: Arc<[Arc<Reference>]>,
-    transitions_s: Option<[f64; 2]>,
+    members: Vec<Member>,
+    terms: usize,
     /// Current raw observations, `[environments, observation]`.
     current: Vec<f32>,
     normal: Vec<f32>,
@@ -104,55 +97,40 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// Environments number `first` to `first + count`.
-    pub fn new(
-        stage: &Arc<Stage>,
-        references: &Arc<[Arc<Reference>]>,
-        setting: &Setting,
-        first: usize,
-        count: usize,
-    ) -> Self {
-        let players: Vec<Player> = (first..first + count)
-            .map(|number| Player {
-                env: Imitate::new(stage.clone(), references[0].clone(), setting),
-                motion: 0,
-                upcoming: 0,
-                number: number as u64,
-                rng: ChaCha8Rng::seed_from_u64(0),
-                episode: Episode::default(),
-                next_change: f64::INFINITY,
-            })
-            .collect();
-        let width = players[0].env.observation_size();
+    /// Environments number `first` to `first + count` of a task.
+    pub fn new(task: &dyn Task, first: usize, count: usize) -> Self {
+        let member = |number: usize| Member {
+            environment: task.environment(Purpose::Training),
+            number: number as u64,
+            rng: ChaCha8Rng::seed_from_u64(0),
+            totals: EpisodeTotals::default(),
+        };
+        let width = size(task.observation());
         Group {
+            members: (first..first + count).map(member).collect(),
+            terms: task.reward_terms().len(),
             current: vec![0.0; count * width],
             normal: vec![0.0; count * width],
-            noise: vec![0.0; count * players[0].env.action_size()],
-            players,
-            references: references.clone(),
-            transitions_s: setting.transitions_s.filter(|_| references.len() > 1),
+            noise: vec![0.0; count * size(task.action())],
             workspace: ActWorkspace::default(),
             buffer: Buffer::default(),
         }
     }
 
     /// Starts every environment anew, from a random stream that `seed`, `round` and its number determine alone.
-    pub fn restart(&mut self, seed: u64, round: u64, starts: &Starts) {
+    pub fn restart(&mut self, seed: u64, round: u64, starts: &StartDistribution) {
         let width = self.width();
-        for (player, row) in self
-            .players
-            .iter_mut()
-            .zip(self.current.chunks_exact_mut(width))
-        {
-            player.rng = stream(seed, player.number + 1, round);
-            player.begin(starts, &self.references, self.transitions_s);
-            player.env.observe(row);
+        let rows = self.current.chunks_exact_mut(width);
+        for (member, row) in self.members.iter_mut().zip(rows) {
+            member.rng = stream(seed, member.number + 1, round);
+            member.start(starts);
+            member.environment.observe(row);
         }
     }
 
-    /// Plays `steps` steps in every environment and keeps the samples.
+    /// Takes `steps` steps in every environment and keeps the samples.
     pub fn collect(&mut self, steps: usize, actor: &Actor) -> Result<(), LearnError> {
-        self.buffer.clear(actor.starts.bins());
+        self.buffer.clear(actor.starts.bins(), self.terms);
         for _ in 0..steps {
             self.act(actor)?;
             self.step(actor)?;
@@ -172,17 +150,15 @@ impl Group {
     }
 
     fn width(&self) -> usize {
-        self.current.len() / self.players.len()
+        self.current.len() / self.members.len()
     }
 
+    /// Draws an action for every environment.
     fn act(&mut self, actor: &Actor) -> Result<(), LearnError> {
-        let actions = self.noise.len() / self.players.len();
-        for (player, noise) in self
-            .players
-            .iter_mut()
-            .zip(self.noise.chunks_exact_mut(actions))
-        {
-            fill_normal(noise, &mut player.rng);
+        let actions = self.noise.len() / self.members.len();
+        let rows = self.noise.chunks_exact_mut(actions);
+        for (member, noise) in self.members.iter_mut().zip(rows) {
+            fill_normal(noise, &mut member.rng);
         }
         actor.normalizer.apply(&self.current, &mut self.normal)?;
         let acted = actor.policy.act(
@@ -199,111 +175,76 @@ impl Group {
         Ok(())
     }
 
+    /// Takes the last actions drawn, and keeps what they led to.
     fn step(&mut self, actor: &Actor) -> Result<(), LearnError> {
-        let width = self.width();
         let first = self.buffer.actions.len() - self.noise.len();
-        let bins = self.players.iter().map(|p| actor.starts.bin(p.place()));
-        let bins: Vec<usize> = bins.collect();
-        let agents = self.players.iter_mut().map(|player| &mut player.env);
-        let steps = Imitate::step_together(agents, &self.buffer.actions[first..]);
-        let players = self.players.iter_mut().zip(bins).zip(steps);
-        for (i, ((player, bin), step)) in players.enumerate() {
+        // A failure counts where the step began.
+        let bin = |member: &Member| actor.starts.bin(member.environment.moment());
+        let bins: Vec<usize> = self.members.iter().map(bin).collect();
+        let stepping = self.members.iter_mut().map(|member| member.stepping(actor));
+        let mut stepping: Vec<Stepping> = stepping.collect();
+        let steps = step_together(&mut stepping, &self.buffer.actions[first..]);
+        for (i, (bin, step)) in bins.into_iter().zip(steps).enumerate() {
             self.buffer.tally.steps[bin] += 1;
             self.buffer.tally.failures[bin] +=
                 u32::from(matches!(step.outcome, Outcome::Failed(_)));
-            let row = &mut self.current[i * width..(i + 1) * width];
-            let outcome =
-                player.change_in_time(step.outcome, self.transitions_s, actor, &self.references);
-            player.env.observe(row);
-            player.episode.reward += step.reward;
-            player.episode.steps += 1;
-            for (sum, term) in self.buffer.terms.iter_mut().zip(step.terms.values()) {
-                *sum += f64::from(term);
+            self.keep(i, &step, actor)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps the step that environment number `i` of the group took, and starts its next episode where that is due.
+    fn keep(&mut self, i: usize, step: &Step, actor: &Actor) -> Result<(), LearnError> {
+        let width = self.width();
+        let row = &mut self.current[i * width..(i + 1) * width];
+        let (member, buffer) = (&mut self.members[i], &mut self.buffer);
+        member.environment.observe(row);
+        member.totals.reward += step.reward;
+        member.totals.steps += 1;
+        for (sum, term) in buffer.terms.iter_mut().zip(&step.terms) {
+            *sum += f64::from(*term);
+        }
+        let (end, final_value) = match step.outcome {
+            Outcome::Running => (StepEnd::Continues, 0.0),
+            Outcome::Failed(_) | Outcome::Finished => (StepEnd::Terminated, 0.0),
+            Outcome::TimeLimit => {
+                let seen = &mut self.normal[..width];
+                actor.normalizer.apply(row, seen)?;
+                let value = actor
+                    .policy
+                    .values(actor.parameters, seen, &mut self.workspace)?[0];
+                (StepEnd::Truncated, value)
             }
-            let (end, final_value) = match outcome {
-                Outcome::Running => (StepEnd::Continues, 0.0),
-                Outcome::Failed(_) | Outcome::Finished => (StepEnd::Terminated, 0.0),
-                Outcome::TimeLimit => {
-                    let seen = &mut self.normal[..width];
-                    actor.normalizer.apply(row, seen)?;
-                    let value = actor
-                        .policy
-                        .values(actor.parameters, seen, &mut self.workspace)?[0];
-                    (StepEnd::Truncated, value)
-                }
-            };
-            self.buffer.rewards.push(step.reward);
-            self.buffer.ends.push(end);
-            self.buffer.final_values.push(final_value);
-            if outcome != Outcome::Running {
-                self.buffer.episodes.push(player.episode);
-                player.begin(actor.starts, &self.references, self.transitions_s);
-                player.env.observe(row);
-            }
+        };
+        buffer.rewards.push(step.reward);
+        buffer.ends.push(end);
+        buffer.final_values.push(final_value);
+        if step.outcome != Outcome::Running {
+            buffer.episodes.push(member.totals);
+            member.start(actor.starts);
+            member.environment.observe(row);
         }
         Ok(())
     }
 }
 
-impl Player {
-    fn place(&self) -> Place {
-        Place {
-            motion: self.motion,
-            time: self.env.time(),
-        }
-    }
-
-    /// Goes over into another motion when it is time for that, or where this one ends.
-    fn change_in_time(
-        &mut self,
-        outcome: Outcome,
-        transitions_s: Option<[f64; 2]>,
-        actor: &Actor,
-        references: &[Arc<Reference>],
-    ) -> Outcome {
-        self.note_arrival();
-        let due = outcome == Outcome::Running && self.env.elapsed() >= self.next_change;
-        if transitions_s.is_none() || !(due || outcome == Outcome::Finished) {
-            return outcome;
-        }
-        self.upcoming = actor.starts.draw(&mut self.rng).motion;
-        let elapsed = self.env.elapsed();
-        self.env.lead_to(&references[self.upcoming]);
-        self.note_arrival();
-        self.plan_change(transitions_s);
-        self.next_change += elapsed;
-        Outcome::Running
-    }
-
-    fn note_arrival(&mut self) {
-        if !self.env.is_leading() {
-            self.motion = self.upcoming;
-        }
-    }
-
-    fn plan_change(&mut self, transitions_s: Option<[f64; 2]>) {
-        if let Some([least, most]) = transitions_s {
-            self.next_change = least + uniform(&mut self.rng) * (most - least);
-            self.episode.possible = self.env.longest_steps();
-        }
-    }
-
-    fn begin(
-        &mut self,
-        starts: &Starts,
-        references: &[Arc<Reference>],
-        transitions_s: Option<[f64; 2]>,
-    ) {
-        let Place { motion, time } = starts.draw(&mut self.rng);
-        (self.motion, self.upcoming) = (motion, motion);
-        self.env.imitate(&references[motion], time);
-        if self.env.is_perturbed() {
-            self.env.perturb(self.rng.next_u64());
-        }
-        self.episode = Episode {
-            possible: self.env.possible_steps(),
-            ..Episode::default()
+impl Member {
+    fn stepping<'a>(&'a mut self, actor: &Actor<'a>) -> Stepping<'a> {
+        let draws = Draws {
+            starts: actor.starts,
+            rng: &mut self.rng,
         };
-        self.plan_change(transitions_s);
+        (self.environment.as_mut(), Some(draws))
+    }
+
+    fn start(&mut self, starts: &StartDistribution) {
+        self.environment.start(&mut Draws {
+            starts,
+            rng: &mut self.rng,
+        });
+        self.totals = EpisodeTotals {
+            possible: self.environment.possible_steps(),
+            ..EpisodeTotals::default()
+        };
     }
 }

@@ -75,7 +75,7 @@ impl<T: Scalar> Experience<T> {
 
 /// A learner whose every parameter is random, so that no gradient is zero by symmetry.
 fn scattered<T: Scalar>(
-    config: Config,
+    config: PpoConfig,
     activation: Activation,
     rng: &mut ChaCha8Rng,
 ) -> Learner<T> {
@@ -94,13 +94,13 @@ fn scattered<T: Scalar>(
 
 #[test]
 fn the_gradient_of_the_whole_loss_is_that_of_finite_differences() {
-    let config = Config {
+    let config = PpoConfig {
         learn_std: true,
         entropy_coefficient: 0.03,
         action_bound: 0.2,
         action_bound_coefficient: 0.7,
         shards: 3,
-        ..Config::default()
+        ..PpoConfig::default()
     };
     for activation in [Activation::Relu, Activation::Elu, Activation::Tanh] {
         let mut rng = ChaCha8Rng::seed_from_u64(21);
@@ -144,11 +144,11 @@ fn the_number_of_threads_changes_no_bit() {
             .build()
             .unwrap();
         pool.install(|| {
-            let config = Config {
+            let config = PpoConfig {
                 minibatch: 300,
                 target_kl: None,
                 learn_std: true,
-                ..Config::default()
+                ..PpoConfig::default()
             };
             let mut rng = ChaCha8Rng::seed_from_u64(8);
             // Wide enough for several pieces of the optimiser's work.
@@ -174,12 +174,12 @@ fn the_number_of_threads_changes_no_bit() {
 fn a_resumed_learner_goes_on_with_the_same_bits() {
     let mut rng = ChaCha8Rng::seed_from_u64(30);
     let mut learner =
-        Learner::<f32>::new(Config::default(), spec(Activation::Relu), &mut rng).unwrap();
+        Learner::<f32>::new(PpoConfig::default(), spec(Activation::Relu), &mut rng).unwrap();
     let experience = Experience::new(&learner, 200, &mut rng);
     learner.update(&experience.batch(), &mut rng).unwrap();
     let mut other_rng = ChaCha8Rng::seed_from_u64(99);
     let mut resumed =
-        Learner::new(Config::default(), spec(Activation::Relu), &mut other_rng).unwrap();
+        Learner::new(PpoConfig::default(), spec(Activation::Relu), &mut other_rng).unwrap();
     resumed.restore(learner.state().clone()).unwrap();
     let mut resumed_rng = rng.clone();
     learner.update(&experience.batch(), &mut rng).unwrap();
@@ -207,12 +207,12 @@ fn learning_rate_follows_the_divergence() {
         experience.log_probs = acted.log_probs.to_vec();
         experience
     };
-    let config = Config {
+    let config = PpoConfig {
         minibatch: 50,
         epochs: 4,
-        ..Config::default()
+        ..PpoConfig::default()
     };
-    let slow = Config {
+    let slow = PpoConfig {
         learning_rate: 2e-5,
         ..config.clone()
     };
@@ -223,7 +223,7 @@ fn learning_rate_follows_the_divergence() {
     assert!(!stats.stopped_early && stats.steps == 32 && stats.learning_rate == 2e-5);
     assert!((learner.state().learning_rate / 3e-5 - 1.0).abs() < 1e-12);
 
-    let fast = Config {
+    let fast = PpoConfig {
         learning_rate: 0.3,
         ..config
     };
@@ -242,7 +242,7 @@ fn learning_rate_follows_the_divergence() {
 fn numbers_that_are_not_finite_are_refused_before_they_reach_the_parameters() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut learner =
-        Learner::<f32>::new(Config::default(), spec(Activation::Relu), &mut rng).unwrap();
+        Learner::<f32>::new(PpoConfig::default(), spec(Activation::Relu), &mut rng).unwrap();
     let before = learner.state().parameters.clone();
     let mut experience = Experience::new(&learner, 50, &mut rng);
     experience.returns[7] = f32::INFINITY;
@@ -270,36 +270,36 @@ fn numbers_that_are_not_finite_are_refused_before_they_reach_the_parameters() {
 fn settings_outside_their_range_are_errors() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for config in [
-        Config {
+        PpoConfig {
             gamma: 1.5,
-            ..Config::default()
+            ..PpoConfig::default()
         },
-        Config {
+        PpoConfig {
             gamma: f64::NAN,
-            ..Config::default()
+            ..PpoConfig::default()
         },
-        Config {
+        PpoConfig {
             minibatch: 0,
-            ..Config::default()
+            ..PpoConfig::default()
         },
-        Config {
+        PpoConfig {
             shards: 0,
-            ..Config::default()
+            ..PpoConfig::default()
         },
-        Config {
+        PpoConfig {
             initial_std: 0.0,
-            ..Config::default()
+            ..PpoConfig::default()
         },
     ] {
         assert!(Learner::<f32>::new(config, spec(Activation::Relu), &mut rng).is_err());
     }
-    let config: Config = serde_json::from_str(r#"{"clip": 0.1, "target_kl": null}"#).unwrap();
+    let config: PpoConfig = serde_json::from_str(r#"{"clip": 0.1, "target_kl": null}"#).unwrap();
     assert_eq!(
         config,
-        Config {
+        PpoConfig {
             clip: 0.1,
             target_kl: None,
-            ..Config::default()
+            ..PpoConfig::default()
         }
     );
 }
@@ -308,11 +308,11 @@ fn settings_outside_their_range_are_errors() {
 #[test]
 fn a_simple_task_is_learned() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let config = Config {
+    let config = PpoConfig {
         minibatch: 128,
         initial_std: 0.2,
         learning_rate: 1e-3,
-        ..Config::default()
+        ..PpoConfig::default()
     };
     let mut learner = Learner::<f32>::new(config, spec(Activation::Relu), &mut rng).unwrap();
     let reward = |o: &[f32], a: &[f32]| {

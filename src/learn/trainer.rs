@@ -1,15 +1,12 @@
 //! A training run: rollouts, advantages, updates, in iterations that read top to bottom.
 
 use super::random::stream;
-use super::rollout::{Actor, Buffer, Episode, Group};
-use super::starts::{Span, Starts};
+use super::rollout::{Actor, Buffer, EpisodeTotals, Group};
 use super::{
-    Batch, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT, Plan, PolicySpec,
-    TrainError, Trajectories, UpdateStats, advantages,
+    Batch, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT, PolicySpec,
+    TrainerSettings, Trajectories, UpdateStats, advantages,
 };
-use crate::clip::LoopMode;
-use crate::motion::Motion;
-use crate::task::{Block, Reference, Setting, Stage, TERM_NAMES, layout};
+use crate::task::{StartDistribution, Task, size};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -49,16 +46,15 @@ pub struct TrainerState {
 
 /// A run in memory.
 pub struct Trainer {
-    plan: Plan,
+    settings: TrainerSettings,
+    task: Arc<dyn Task>,
     learner: Learner<f32>,
     normalizer: Normalizer,
-    observation: Vec<Block>,
     groups: Vec<Group>,
-    starts: Starts,
+    starts: StartDistribution,
     iteration: u64,
     /// The environments haven't begun yet, or stand where an earlier state left them.
     stale: bool,
-    control_dt: f64,
     batch: Samples,
 }
 
@@ -74,59 +70,53 @@ struct Samples {
 }
 
 impl Trainer {
+    /// A trainer that hasn't learned anything yet.
+    ///
     /// # Errors
-    /// A plan or a motion that can't be trained.
-    pub fn new(plan: Plan, stage: Stage, motions: &[Motion]) -> Result<Self, TrainError> {
-        plan.check()?;
-        let references: Result<Arc<[_]>, _> = motions
-            .iter()
-            .map(|motion| Reference::new(motion, &stage).map(Arc::new))
-            .collect();
-        let references = references?;
-        let contacts = contacts(&references)?;
-        let observation = layout(plan.task.observations, &stage, contacts);
+    /// A setting out of its range.
+    pub fn new(settings: TrainerSettings, task: Arc<dyn Task>) -> Result<Self, LearnError> {
+        settings.check()?;
         let spec = PolicySpec {
-            observation: observation.iter().map(|block| block.size).sum(),
-            action: stage.character.dof,
-            hidden: plan.hidden.clone(),
-            activation: plan.activation,
+            observation: size(task.observation()),
+            action: size(task.action()),
+            hidden: settings.hidden.clone(),
+            activation: settings.activation,
         };
-        let learner = Learner::new(plan.ppo.clone(), spec, &mut stream(plan.seed, 0, 0))?;
-        let stage = Arc::new(stage);
-        let groups = (0..plan.environments)
-            .step_by(plan.group)
-            .map(|first| {
-                let count = plan.group.min(plan.environments - first);
-                Group::new(&stage, &references, &plan.task, first, count)
-            })
-            .collect();
+        let learner = Learner::new(settings.ppo.clone(), spec, &mut stream(settings.seed, 0, 0))?;
+        let group = |first: usize| {
+            let count = settings.group.min(settings.environments - first);
+            Group::new(task.as_ref(), first, count)
+        };
+        let firsts = (0..settings.environments).step_by(settings.group);
         Ok(Trainer {
             normalizer: Normalizer::new(learner.policy().spec().observation),
-            starts: starts(&references, &plan.task),
-            control_dt: plan.task.physics.control_dt(),
-            plan,
+            starts: task.starts(),
+            groups: firsts.map(group).collect(),
+            settings,
+            task,
             learner,
-            observation,
-            groups,
             iteration: 0,
             stale: true,
             batch: Samples::default(),
         })
     }
 
-    pub fn plan(&self) -> &Plan {
-        &self.plan
+    /// How it learns.
+    pub fn settings(&self) -> &TrainerSettings {
+        &self.settings
     }
 
+    /// What it learns.
+    pub fn task(&self) -> &Arc<dyn Task> {
+        &self.task
+    }
+
+    /// The network and its optimiser.
     pub fn learner(&self) -> &Learner<f32> {
         &self.learner
     }
 
-    /// The parts of what the policy sees, in order.
-    pub fn observation(&self) -> &[Block] {
-        &self.observation
-    }
-
+    /// Statistics of the observations.
     pub fn normalizer(&self) -> &Normalizer {
         &self.normalizer
     }
@@ -138,17 +128,17 @@ impl Trainer {
 
     /// Control steps taken by all environments together.
     pub fn samples(&self) -> u64 {
-        self.iteration * (self.plan.environments * self.plan.horizon) as u64
+        self.iteration * (self.settings.environments * self.settings.horizon) as u64
     }
 
     /// Whether the samples of the plan are used up.
     pub fn is_done(&self) -> bool {
-        self.samples() >= self.plan.samples
+        self.samples() >= self.settings.samples
     }
 
     /// Whether the run stands between two rounds, where it can be saved and resumed to the same bits.
     pub fn is_between_rounds(&self) -> bool {
-        self.iteration.is_multiple_of(self.plan.round.max(1))
+        self.iteration.is_multiple_of(self.settings.round.max(1))
     }
 
     pub fn state(&self) -> TrainerState {
@@ -203,31 +193,32 @@ impl Trainer {
             advantages: &self.batch.advantages,
             returns: &self.batch.returns,
         };
-        let update = self
-            .learner
-            .update(&batch, &mut stream(self.plan.seed, 0, self.iteration + 1))?;
+        let update = self.learner.update(
+            &batch,
+            &mut stream(self.settings.seed, 0, self.iteration + 1),
+        )?;
         self.iteration += 1;
         Ok(self.metrics(update, std))
     }
 
     /// Share of the plan's samples that are used up.
     fn done(&self) -> f64 {
-        (self.samples() as f64 / self.plan.samples.max(1) as f64).min(1.0)
+        (self.samples() as f64 / self.settings.samples.max(1) as f64).min(1.0)
     }
 
     fn schedule_rate(&mut self) {
-        if self.plan.ppo.target_kl.is_some() {
+        if self.settings.ppo.target_kl.is_some() {
             return;
         }
-        let share = 1.0 + (self.plan.final_learning_rate - 1.0) * self.done();
+        let share = 1.0 + (self.settings.final_learning_rate - 1.0) * self.done();
         self.learner
-            .set_learning_rate(self.plan.ppo.learning_rate * share);
+            .set_learning_rate(self.settings.ppo.learning_rate * share);
     }
 
     fn schedule_noise(&mut self) -> f64 {
         let done = self.done();
-        let std = self.plan.ppo.initial_std * (1.0 + (self.plan.final_std - 1.0) * done);
-        if self.plan.ppo.learn_std {
+        let std = self.settings.ppo.initial_std * (1.0 + (self.settings.final_std - 1.0) * done);
+        if self.settings.ppo.learn_std {
             return self.learner.mean_std();
         }
         self.learner.set_std(std);
@@ -248,8 +239,11 @@ impl Trainer {
         if self.is_between_rounds() || self.stale {
             // A state from within a round is played on from streams that no round has.
             let (seed, part) = match self.is_between_rounds() {
-                true => (self.plan.seed, self.iteration / self.plan.round.max(1)),
-                false => (!self.plan.seed, self.iteration),
+                true => (
+                    self.settings.seed,
+                    self.iteration / self.settings.round.max(1),
+                ),
+                false => (!self.settings.seed, self.iteration),
             };
             self.stale = false;
             self.groups
@@ -263,7 +257,7 @@ impl Trainer {
             normalizer: &normalizer,
             starts: &self.starts,
         };
-        let steps = self.plan.horizon;
+        let steps = self.settings.horizon;
         self.groups
             .par_iter_mut()
             .try_for_each(|group| group.collect(steps, &actor))
@@ -301,8 +295,8 @@ impl Trainer {
             let (advantage, value) = (&mut batch.advantages[start..], &mut batch.returns[start..]);
             advantages(
                 &rollout,
-                self.plan.ppo.gamma,
-                self.plan.ppo.lambda,
+                self.settings.ppo.gamma,
+                self.settings.ppo.lambda,
                 advantage,
                 value,
             )?;
@@ -313,13 +307,13 @@ impl Trainer {
     fn metrics(&self, update: UpdateStats, action_std: f64) -> Metrics {
         let buffers = || self.groups.iter().map(|group| &group.buffer);
         let episodes: Vec<_> = buffers().flat_map(|b: &Buffer| &b.episodes).collect();
-        let mean = |value: &dyn Fn(&Episode) -> f64| {
+        let mean = |value: &dyn Fn(&EpisodeTotals) -> f64| {
             let sum: f64 = episodes.iter().map(|episode| value(episode)).sum();
             (!episodes.is_empty()).then(|| sum / episodes.len() as f64)
         };
         let steps = buffers().map(|b| b.ends.len()).sum::<usize>().max(1) as f64;
-        let has = self.plan.task.rewards.kernels.has();
-        let terms = TERM_NAMES.iter().enumerate().filter(|(i, _)| has[*i]);
+        let control_dt = 1.0 / self.task.control_hz();
+        let terms = self.task.reward_terms().iter().enumerate();
         let reward_terms = terms.map(|(i, name)| {
             let sum: f64 = buffers().map(|b| b.terms[i]).sum();
             ((*name).to_owned(), sum / steps)
@@ -329,43 +323,11 @@ impl Trainer {
             samples: self.samples(),
             episode_return: mean(&|e| f64::from(e.reward)),
             normalized_return: mean(&|e| f64::from(e.reward) / e.possible),
-            episode_length: mean(&|e| f64::from(e.steps) * self.control_dt),
+            episode_length: mean(&|e| f64::from(e.steps) * control_dt),
             episodes: episodes.len() as u64,
             update,
             action_std,
             reward_terms: reward_terms.collect(),
         }
-    }
-}
-
-/// Where episodes of these references begin.
-fn starts(references: &[Arc<Reference>], task: &Setting) -> Starts {
-    let control_dt = task.physics.control_dt();
-    let span = |reference: &Arc<Reference>| Span {
-        duration: reference.duration(),
-        last_start: reference.last_start(control_dt),
-        wraps: reference.loop_mode() == LoopMode::Wrap,
-    };
-    let spans: Vec<Span> = references.iter().map(span).collect();
-    Starts::new(
-        &spans,
-        task.start_anywhere,
-        task.adaptive_starts,
-        control_dt,
-    )
-}
-
-/// Contact links of the motions, which must be the same for all.
-fn contacts(references: &[Arc<Reference>]) -> Result<usize, TrainError> {
-    let first = references.first().ok_or(TrainError::NoMotion)?;
-    match references
-        .iter()
-        .find(|r| r.contact_links != first.contact_links)
-    {
-        Some(other) => Err(TrainError::OtherContacts {
-            first: first.name.clone(),
-            other: other.name.clone(),
-        }),
-        None => Ok(first.contact_links.len()),
     }
 }

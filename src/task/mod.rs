@@ -1,32 +1,33 @@
-//! What is learned: observations, actions, reward terms, termination.
+//! What is learned: observations, actions, reward terms, and when an episode ends.
 //!
-//! [`Imitate`] is the phase-based imitation of a reference motion. Every observation block, reward term and
-//! termination rule is a pure function that training, evaluation, plots and tests all call.
+//! [`Task`] and [`Environment`] are all that a learner, an evaluation, a replay or a live player knows of a task.
+//! [`TaskSettings`] says which task it is and makes it; [`Imitate`] is the phase-based imitation of reference motions.
 
-mod aim;
-mod blend;
-mod clock;
-mod course;
+mod disturbance;
 mod dynamics;
+mod environment;
+mod episode;
+mod error;
 mod imitate;
-mod observe;
-mod perturb;
-mod reference;
-mod reward;
-mod setting;
-mod stage;
-mod terminate;
-#[cfg(test)]
-mod tests;
-mod transition;
+mod model;
+mod settings;
+mod starts;
+mod step;
 
+pub use disturbance::Perturbations;
 pub use dynamics::Dynamics;
-pub use imitate::{Imitate, Outcome, Step};
-pub use observe::{Block, Scene, layout, observation_size, observe};
-pub use perturb::Perturbations;
-pub use reference::{Reference, Sample};
-pub use reward::{Kernels, TERM_NAMES, Terms};
-pub use setting::{Actions, Observations, Rewards, Setting, TaskError, Terminations};
-pub use stage::{SolePoint, Stage};
-pub use terminate::Failure;
-pub use transition::Placement;
+pub use environment::{Draws, Environment, Stepping, Task, frame, step, step_together};
+pub(crate) use episode::mean;
+pub use episode::{Episode, Frame, Good, Measure, Unit};
+pub use error::TaskError;
+pub use imitate::{
+    Actions, Imitate, ImitationSettings, Kernels, ObservationInputs, Observations, Placement,
+    Reference, Rewards, TERM_NAMES, Terminations, Terms, layout, observation_size, observe,
+};
+pub use model::{CharacterModel, SolePoint};
+pub use settings::{TASKS, TaskSettings};
+pub use starts::{Moment, Span, StartDistribution, Tally};
+pub use step::{
+    Block, Case, EpisodeStart, Failure, Input, MAX_TERMS, Outcome, Purpose, ReferenceState,
+    StartState, Step, TermValues, size,
+};

@@ -1,46 +1,45 @@
 //! An agent's episode as a recording.
 
 use super::content::{Actor, Curve, Recording, Shove, parts};
-use mimic::evaluate::{Frame, Trace};
-use mimic::motion::Motion;
 use mimic::sim::LinkState;
-use mimic::skeleton::Skeleton;
-use mimic::task::{Dynamics, Stage, TERM_NAMES};
+use mimic::task::{Dynamics, Episode, Frame, ReferenceState, Task};
 use nalgebra::{Isometry3, Vector3};
 
 impl Recording {
-    /// The recording of one episode: the agent, its reference, and what the agent earned.
-    pub fn of_trace(name: &str, trace: &Trace, motion: &Motion, stage: &Stage) -> Self {
-        let skeleton: &Skeleton = &stage.skeleton;
-        let frames = &trace.frames;
-        let bodies = |links: &[LinkState]| stage.character.body_poses(links);
+    /// Agent and reference of one episode; the agent alone where the task has no reference.
+    pub fn of_episode(name: &str, episode: &Episode, task: &dyn Task) -> Self {
+        let model = task.model();
+        let frames = &episode.frames;
+        let bodies = |links: &[LinkState]| model.character.body_poses(links);
         let agent = |f: &Frame| (bodies(&f.agent), f.dynamics, f.contacts.clone());
-        let reference = |f: &Frame| {
-            let sample = &f.reference;
-            (
-                bodies(&sample.links),
-                sample.dynamics,
-                sample.contacts.clone(),
-            )
+        let reference = |state: &ReferenceState| {
+            let contacts = state.contacts.clone();
+            (bodies(&state.links), state.dynamics, contacts)
+        };
+        let references: Vec<_> = frames.iter().filter_map(|f| f.reference.as_ref()).collect();
+        let agent = Actor::of_frames(frames.iter().map(agent));
+        let (reference, agent) = match references.is_empty() {
+            true => (agent, None),
+            false => (
+                Actor::of_frames(references.iter().copied().map(reference)),
+                Some(agent),
+            ),
         };
         Self {
             name: name.to_string(),
-            fps: trace.control_hz,
-            parts: parts(skeleton),
-            contact_parts: motion.contact_bodies.clone(),
-            reference: Actor::of_frames(frames.iter().map(reference)),
-            agent: Some(Actor::of_frames(frames.iter().map(agent))),
-            phase: frames
-                .iter()
-                .map(|f| f64::from(f.reference.phase))
-                .collect(),
-            rewards: rewards(frames),
+            fps: episode.control_hz,
+            parts: parts(&model.skeleton),
+            contact_parts: task.contact_bodies().to_vec(),
+            reference,
+            agent,
+            phase: references.iter().map(|r| f64::from(r.phase)).collect(),
+            rewards: rewards(task.reward_terms(), frames),
             beside: 0.0,
-            failed_s: trace
+            failed_s: episode
                 .failure
-                .map(|_| trace.survived as f64 / trace.control_hz),
-            shoves: shoves(trace),
-            trunk: stage.trunk(),
+                .map(|_| episode.survived as f64 / episode.control_hz),
+            shoves: shoves(episode),
+            trunk: model.trunk(),
         }
     }
 }
@@ -65,34 +64,23 @@ impl Actor {
     }
 }
 
-fn shoves(trace: &Trace) -> Vec<Shove> {
-    let frames = trace.frames.iter().enumerate();
+fn shoves(episode: &Episode) -> Vec<Shove> {
+    let frames = episode.frames.iter().enumerate();
     let shove = |(number, frame): (usize, &Frame)| {
         Some(Shove {
-            at_s: number as f64 / trace.control_hz,
-            impulse: frame.shove?.into(),
+            at_s: number as f64 / episode.control_hz,
+            impulse: frame.push?.into(),
         })
     };
     frames.filter_map(shove).collect()
 }
 
-fn rewards(frames: &[Frame]) -> Vec<Curve> {
-    // A term that stays at zero belongs to another reward.
-    let earned =
-        |(index, _): &(usize, &&str)| frames.iter().any(|f| f.terms.values()[*index] > 0.0);
+fn rewards(names: &[&str], frames: &[Frame]) -> Vec<Curve> {
     let term = |(index, name): (usize, &&str)| Curve {
         name: name.replace('_', " "),
-        values: frames
-            .iter()
-            .map(|f| f64::from(f.terms.values()[index]))
-            .collect(),
+        values: frames.iter().map(|f| f64::from(f.terms[index])).collect(),
     };
-    TERM_NAMES
-        .iter()
-        .enumerate()
-        .filter(earned)
-        .map(term)
-        .collect()
+    names.iter().enumerate().map(term).collect()
 }
 
 fn wide(v: &Vector3<f32>) -> Vector3<f64> {

@@ -6,12 +6,15 @@ use crate::printer::Printer;
 use crate::runs;
 use mimic::clip::Clip;
 use mimic::import;
-use mimic::learn::{Plan, Trainer};
-use mimic::motion::Motion;
+use mimic::learn::Trainer;
 use mimic::retarget;
+use mimic::run::Plan;
 use mimic::sim::World;
 use mimic::skeleton::Skeleton;
-use mimic::task::{Imitate, Reference, Stage};
+use mimic::task::{
+    CharacterModel, Environment, EpisodeStart, Outcome as Stands, Purpose, Reference, StartState,
+    Stepping, Task, size, step_together,
+};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::fmt::Write;
@@ -66,8 +69,7 @@ struct Report {
 struct Bench {
     plan: Plan,
     clip: Clip,
-    motion: Motion,
-    stage: Arc<Stage>,
+    task: Arc<dyn Task>,
     reference: Arc<Reference>,
     threads: usize,
     time: Duration,
@@ -78,7 +80,7 @@ impl Args {
         let threads = runs::use_threads(self.threads)?;
         let bench = Bench::new(threads, Duration::from_secs_f64(self.seconds))?;
         let say = |what: &str| printer.note(format!("measuring {what}"));
-        let physics = &bench.plan.task.physics;
+        let physics = bench.plan.task.physics();
         say("retargeting");
         let retarget_frames_per_second = bench.retarget()?;
         say("the reference");
@@ -96,7 +98,7 @@ impl Args {
             train_samples_per_second,
             control_hz: physics.control_hz,
             physics_hz: physics.physics_hz(),
-            dof: bench.stage.character.dof,
+            dof: size(bench.task.action()),
             network: bench.plan.hidden.clone(),
             reference_frames_per_second,
             retarget_frames_per_second,
@@ -120,14 +122,15 @@ impl Bench {
         let motion = retarget::retarget(&clip, &skeleton, &options)
             .map_err(broken)?
             .motion;
-        let stage = Arc::new(Stage::new(skeleton).map_err(broken)?);
-        let reference = Reference::new(&motion, &stage).map_err(broken)?;
+        let model = Arc::new(CharacterModel::new(skeleton).map_err(broken)?);
+        let reference = Reference::new(&motion, &model).map_err(broken)?;
+        let motions = std::slice::from_ref(&motion);
+        let task = plan.task.build(model, motions).map_err(broken)?;
         let reference = Arc::new(reference);
         Ok(Self {
             plan,
             clip,
-            motion,
-            stage,
+            task,
             reference,
             threads,
             time,
@@ -136,7 +139,7 @@ impl Bench {
 
     fn retarget(&self) -> Outcome<f64> {
         let options = retarget::Options::default();
-        let once = || retarget::retarget(&self.clip, &self.stage.skeleton, &options);
+        let once = || retarget::retarget(&self.clip, &self.task.model().skeleton, &options);
         once().map_err(broken)?;
         self.count(|| {
             let done = once().map_err(broken)?;
@@ -156,23 +159,24 @@ impl Bench {
         })
     }
 
-    /// Where number `i` of a group begins, seconds: each elsewhere, as in training.
-    fn start(&self, i: usize) -> f64 {
-        self.reference.duration() * i as f64 / self.plan.group as f64
+    /// Where number `i` of a group begins, as a share of the motion: each elsewhere, as in training.
+    fn share(&self, i: usize) -> f64 {
+        i as f64 / self.plan.group as f64
     }
 
     /// Integrations of joints and contacts, at `physics_hz`, of characters that fall to the ground; each thread steps as
     /// many at once as in training.
     fn physics(&self) -> Outcome<f64> {
-        let settings = self.plan.task.physics;
+        let settings = *self.plan.task.physics();
         self.on_all_threads(|| {
             let mut first = self.reference.blank();
-            let new = |_| World::new(&self.stage.character, settings);
+            let new = |_| World::new(&self.task.model().character, settings);
             let mut worlds: Vec<World> = (0..self.plan.group).map(new).collect();
             let mut results = vec![Ok(()); worlds.len()];
             self.count(|| {
                 for (i, world) in worlds.iter_mut().enumerate() {
-                    self.reference.sample(self.start(i), &mut first);
+                    let time = self.reference.duration() * self.share(i);
+                    self.reference.sample(time, &mut first);
                     world.reset(&first.links);
                 }
                 let mut all: Vec<&mut World> = worlds.iter_mut().collect();
@@ -188,20 +192,23 @@ impl Bench {
     /// Control steps with observation, reward and reference, without a network.
     fn environment(&self) -> Outcome<f64> {
         self.on_all_threads(|| {
-            let new = || Imitate::new(self.stage.clone(), self.reference.clone(), &self.plan.task);
-            let mut envs: Vec<Imitate> = (0..self.plan.group).map(|_| new()).collect();
-            let actions = vec![0.0; envs.len() * envs[0].action_size()];
-            let mut observation = vec![0.0; envs[0].observation_size()];
-            for (i, env) in envs.iter_mut().enumerate() {
-                env.reset(self.start(i));
+            let new = |_| self.task.environment(Purpose::Training);
+            let mut all: Vec<Box<dyn Environment>> = (0..self.plan.group).map(new).collect();
+            let actions = vec![0.0; all.len() * size(self.task.action())];
+            let mut observation = vec![0.0; size(self.task.observation())];
+            let start = |i| EpisodeStart::new(0, StartState::Reference(self.share(i)));
+            for (i, environment) in all.iter_mut().enumerate() {
+                environment.start_at(&start(i));
             }
             self.count(|| {
-                let steps = Imitate::step_together(envs.iter_mut(), &actions);
-                for (i, (env, step)) in envs.iter_mut().zip(&steps).enumerate() {
-                    if step.outcome != mimic::task::Outcome::Running {
-                        env.reset(self.start(i));
+                let stepping = all.iter_mut().map(|e| (e.as_mut() as _, None));
+                let mut stepping: Vec<Stepping> = stepping.collect();
+                let steps = step_together(&mut stepping, &actions);
+                for (i, (environment, step)) in all.iter_mut().zip(&steps).enumerate() {
+                    if step.outcome != Stands::Running {
+                        environment.start_at(&start(i));
                     }
-                    env.observe(&mut observation);
+                    environment.observe(&mut observation);
                 }
                 Ok(steps.len() as u64)
             })
@@ -210,13 +217,11 @@ impl Bench {
 
     /// Whole iterations: acting, physics, learning.
     fn train(&self) -> Outcome<f64> {
-        let stage = Stage::clone(&self.stage);
-        let motions = std::slice::from_ref(&self.motion);
-        let mut trainer = Trainer::new(self.plan.clone(), stage, motions).map_err(broken)?;
-        trainer.iterate().map_err(runs::learn_failure)?;
+        let mut trainer = Trainer::new(self.plan.trainer(), self.task.clone())?;
+        trainer.iterate()?;
         let (start, before) = (Instant::now(), trainer.samples());
         while start.elapsed() < self.time {
-            trainer.iterate().map_err(runs::learn_failure)?;
+            trainer.iterate()?;
         }
         Ok((trainer.samples() - before) as f64 / start.elapsed().as_secs_f64())
     }

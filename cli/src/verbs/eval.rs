@@ -5,9 +5,10 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::output;
 use crate::printer::Printer;
-use crate::runs::{self, Measured};
-use mimic::evaluate::{Failed, Options};
-use mimic::learn::Run;
+use crate::runs;
+use mimic::evaluate::{FailedEpisode, Options};
+use mimic::run::{CaseEvaluation, Run};
+use mimic::task::{Measure, Unit};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -76,7 +77,7 @@ impl Args {
                 Ok(())
             }
         };
-        printer.result(&runs::evaluation_json(&results), || text(&results))?;
+        printer.result(&CaseEvaluation::json(&results), || text(&results))?;
         kept
     }
 }
@@ -104,15 +105,15 @@ fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
     Ok(path)
 }
 
-fn write(path: &Path, results: &[Measured]) -> Outcome {
+fn write(path: &Path, results: &[CaseEvaluation]) -> Outcome {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
     }
-    output::write_whole(path, runs::evaluation_text(results).as_bytes())
+    output::write_whole(path, CaseEvaluation::text(results).as_bytes())
 }
 
 /// A run that can't be written, such as somebody else's, can still be measured.
-fn keep(run: &Run, options: &Options, results: &[Measured], printer: &Printer) {
+fn keep(run: &Run, options: &Options, results: &[CaseEvaluation], printer: &Printer) {
     let usual = Options {
         perturbations: options.perturbations,
         ..Options::default()
@@ -122,14 +123,13 @@ fn keep(run: &Run, options: &Options, results: &[Measured], printer: &Printer) {
             "`{}` keeps its evaluation with the default options; `--out FILE` writes this one",
             run.dir().display()
         ));
-    } else if let Err(failure) = runs::keep(run, results) {
-        let reason = failure.message().unwrap_or_default();
-        printer.warn(format!("{reason}; `--out FILE` writes it elsewhere"));
+    } else if let Err(error) = run.keep_evaluation(results) {
+        printer.warn(format!("{error}; `--out FILE` writes it elsewhere"));
     }
 }
 
-/// Start phases from which it fails, the first few of them.
-fn failed(failures: &[Failed], how: &str) -> Option<(String, String)> {
+/// Start phases from which the agent fails, the first few of them.
+fn failed(failures: &[FailedEpisode], how: &str) -> Option<(String, String)> {
     let starts = failures.iter().take(MOST_PHASES);
     let mut phases: Vec<String> = starts.map(|f| format!("{:.2}", f.start)).collect();
     if failures.len() > MOST_PHASES {
@@ -140,65 +140,42 @@ fn failed(failures: &[Failed], how: &str) -> Option<(String, String)> {
 }
 
 /// A table per motion.
-pub fn text(results: &[Measured]) -> String {
-    let table = |measured: &Measured| {
-        let (name, e) = (&measured.motion, &measured.evaluation);
-        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let rows = [
-            ("survival", percent(e.survival)),
-            (
-                "survival, from the first frame",
-                percent(e.survival_from_start),
-            ),
-            (
-                "success, mean error below 0.5 m",
-                percent(e.success_mean_0_5),
-            ),
-            (
-                "success, no error above 0.25 m",
-                percent(e.success_max_0_25),
-            ),
-            ("body error, global", format!("{:.1} mm", e.mpjpe_global_mm)),
-            (
-                "body error, root subtracted",
-                format!("{:.1} mm", e.mpjpe_local_mm),
-            ),
-            ("velocity error", format!("{:.3} m/s", e.velocity_error_m_s)),
-            (
-                "centre of mass error",
-                format!("{:.1} mm", 1e3 * e.com_error_m),
-            ),
-            ("angular momentum error", percent(e.angular_momentum_error)),
-            ("contact F1", format!("{:.3}", e.contact_f1)),
-            ("foot skate", format!("{:.3} m/s", e.foot_skate_m_s)),
-            ("normalised return", format!("{:.3}", e.normalized_return)),
-            (
-                "root turned",
-                format!("{:.2} rad", e.root_rotation_turned_rad),
-            ),
-        ];
-        let digests = [("from rest", &e.from_rest), ("disturbed", &e.perturbed)];
-        let digests = digests
-            .into_iter()
-            .filter_map(|(how, digest)| Some((how, digest.as_ref()?)));
-        let rows = rows.map(|(name, value)| (name.to_owned(), value));
-        let more = digests.flat_map(|(how, d)| {
-            [
-                (format!("survival, {how}"), percent(d.survival)),
-                (
-                    format!("body error, local, {how}"),
-                    format!("{:.1} mm", d.mpjpe_local_mm),
-                ),
-            ]
-        });
-        let shoved = e.perturbed.iter();
-        let shoved = shoved.filter_map(|d| failed(&d.failures, ", disturbed"));
-        let failed = failed(&e.failures, "").into_iter().chain(shoved);
-        let rows = rows.into_iter().chain(more).chain(failed);
-        let rows: String = rows
-            .map(|(name, value)| format!("  {name:34} {value:>12}\n"))
-            .collect();
-        format!("{name}, {} episodes\n{rows}", e.episodes)
-    };
+pub fn text(results: &[CaseEvaluation]) -> String {
     results.iter().map(table).collect()
+}
+
+fn table(result: &CaseEvaluation) -> String {
+    let (name, found) = (&result.motion, &result.evaluation);
+    let row = |m: &Measure| (m.label.to_owned(), value(m));
+    let mut rows: Vec<(String, String)> = found.measures.iter().map(row).collect();
+    let rest = ("from rest", &found.from_rest);
+    let disturbed = found.perturbed.iter().map(|p| ("disturbed", p));
+    for (how, more) in std::iter::once(rest).chain(disturbed) {
+        let shown = |m: &&Measure| ["survival", "mpjpe_local_mm"].contains(&m.name);
+        let row = |m: &Measure| (format!("{}, {how}", m.label), value(m));
+        rows.extend(more.measures.iter().filter(shown).map(row));
+    }
+    let perturbed = found.perturbed.iter();
+    let perturbed = perturbed.filter_map(|p| failed(&p.failures, ", disturbed"));
+    rows.extend(failed(&found.failures, "").into_iter().chain(perturbed));
+    let lines: String = rows
+        .iter()
+        .map(|(name, value)| format!("  {name:38} {value:>12}\n"))
+        .collect();
+    format!("{name}, {} episodes\n{lines}", found.episodes)
+}
+
+/// A measure with its unit.
+fn value(measure: &Measure) -> String {
+    let value = measure.value;
+    match measure.unit {
+        Unit::Share => format!("{:.1} %", 100.0 * value),
+        Unit::Score => format!("{value:.3}"),
+        Unit::Millimeters => format!("{value:.1} mm"),
+        Unit::Meters => format!("{:.1} mm", 1e3 * value),
+        Unit::MetersPerSecond => format!("{value:.3} m/s"),
+        Unit::Radians => format!("{value:.2} rad"),
+        Unit::Degrees => format!("{value:.1}°"),
+        Unit::Seconds => format!("{value:.2} s"),
+    }
 }

@@ -5,7 +5,7 @@ use crate::locate;
 use crate::output;
 use crate::plot::curves::{self, Curve, Panel, Scale};
 use crate::printer::Printer;
-use crate::runs;
+use mimic::run::files;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
@@ -94,7 +94,7 @@ impl Args {
         };
         let path = output::result_path(self.out.as_deref(), file, "svg");
         for log in &logs {
-            output::make_room(&path, &log.folder.join(runs::METRICS), "svg")?;
+            output::make_room(&path, &log.folder.join(files::METRICS), "svg")?;
         }
         let panels = panels(&logs, self.smooth);
         output::write_whole(&path, curves::curves(&names, &panels).as_bytes())?;
@@ -105,7 +105,7 @@ impl Args {
 
 impl Log {
     fn read(folder: &Path) -> Outcome<Self> {
-        let path = folder.join(runs::METRICS);
+        let path = folder.join(files::METRICS);
         let text = std::fs::read_to_string(&path)
             .map_err(|e| Failure::unreadable(&path, &e).with_remedy("train the run first"))?;
         let mut lines = Vec::new();
@@ -127,7 +127,7 @@ impl Log {
         let name = folder.file_name().unwrap_or(folder.as_os_str());
         Ok(Self {
             name: name.to_string_lossy().into_owned(),
-            evaluation: evaluation(&folder.join(runs::EVALUATION))?,
+            evaluation: evaluation(&folder.join(files::EVALUATION))?,
             folder: folder.to_owned(),
             lines,
         })

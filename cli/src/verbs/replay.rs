@@ -9,7 +9,8 @@ use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
 use crate::runs;
 use crate::viewer::{self, Viewer};
-use mimic::evaluate::{Options, Start};
+use mimic::evaluate::Options;
+use mimic::task::{EpisodeStart, StartState};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -162,9 +163,11 @@ impl Args {
         let which = self.motion.unwrap_or(1) - 1;
         let phase = self.phase.unwrap_or(0.0);
         let perturbations = runs::perturbations(&run, true).filter(|_| self.perturb);
-        let disturbed = perturbations.map(|ranges| (ranges, phase_number(phase)));
-        let opening = (Start::At(phase), disturbed);
-        runs::record(&run, which, opening, self.seconds.unwrap_or(SECONDS))
+        let start = EpisodeStart {
+            disturbance: perturbations.map(|ranges| (ranges, phase_number(phase))),
+            ..EpisodeStart::new(which, StartState::Reference(phase))
+        };
+        runs::record(&run, start, self.seconds.unwrap_or(SECONDS))
     }
 
     fn record_motion(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {

@@ -12,9 +12,9 @@ use crate::locate;
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
-use clap::ValueEnum;
-use mimic::learn::{Run, RunError, TrainError, Trainer};
-use mimic::task::TaskError;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use mimic::run::{Run, RunError, Session, files};
+use mimic::task::{TASKS, TaskError};
 use preset::Preset;
 use progress::Progress;
 use std::path::{Path, PathBuf};
@@ -55,8 +55,8 @@ pub struct Args {
     #[arg(value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// What is learned
-    #[arg(long, value_enum, default_value_t)]
-    task: Task,
+    #[arg(long, value_name = "TASK", value_parser = tasks(), default_value = TASKS[0].0)]
+    task: String,
     /// Settings to start from: `default`, `deepmimic`, `deepmimic2018`, `booth2020`, those of a run, or a JSON file with a plan as in a
     /// run's config.json
     #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
@@ -96,11 +96,10 @@ pub struct Args {
     retarget: RetargetArgs,
 }
 
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum Task {
-    /// Follow the motion, guided by its phase
-    #[default]
-    Imitate,
+/// Names of the tasks, with what they are.
+fn tasks() -> PossibleValuesParser {
+    let value = |(name, about): (&'static str, &'static str)| PossibleValue::new(name).help(about);
+    PossibleValuesParser::new(TASKS.map(value))
 }
 
 /// How a training session came to its end.
@@ -117,33 +116,39 @@ impl Args {
             Some(run) => runs::open(Some(run))?,
             None => self.create(library, printer)?,
         };
-        let config = run.dir().join(locate::RUN_CONFIG);
-        let mut trainer = run
-            .trainer()
-            .map_err(|e| preset::failure(Some(&config), e))?;
-        if trainer.is_done() {
-            return finish::make_up(&run, &trainer, printer);
+        let config = run.dir().join(files::CONFIG);
+        let session = Session::open(run);
+        let mut session = session.map_err(|e| preset::failure(Some(&config), e))?;
+        if session.is_done() {
+            return finish::make_up(&session, printer);
         }
         printer.note(format!(
             "training `{}` on {threads} threads; Ctrl-C saves and stops",
-            run.dir().display()
+            session.run().dir().display()
         ));
         let minutes = self
             .minutes
             .map(|minutes| Duration::from_secs_f64(60.0 * minutes));
-        match session(&run, &mut trainer, minutes, printer)? {
+        match train(&mut session, minutes, printer)? {
             End::Interrupted => {
-                printer.say(farewell(&run));
+                printer.say(farewell(session.run()));
                 Ok(())
             }
-            End::OutOfTime | End::Done => finish::finish(&run, printer),
+            End::OutOfTime | End::Done => finish::finish(&session, printer),
         }
     }
 
     /// Everything a run is made of is read and checked before its folder appears.
     fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
-        let Task::Imitate = self.task;
         let preset = self.preset()?;
+        let task = preset.plan.task.name();
+        if self.task != task {
+            return Err(Failure::user(format!(
+                "`--task {}` doesn't fit the preset, which is for the task `{task}`",
+                self.task
+            ))
+            .with_remedy("choose another preset"));
+        }
         let preparations = self.preparations(library, preset.skeleton)?;
         let folder = self.folder(&preparations, printer)?;
         let mut motions = Vec::new();
@@ -157,16 +162,16 @@ impl Args {
             let skeleton = skeleton.get_or_insert(own);
             motion
                 .check_skeleton(skeleton)
-                .map_err(|e| Failure::input(&preparation.file, e))?;
+                .map_err(|e| Failure::in_file(&preparation.file, e))?;
             let frames = motion.qpos.len();
             if frames < 2 {
                 let short = TaskError::TooShort { frames };
-                return Err(Failure::input(&preparation.file, short));
+                return Err(Failure::in_file(&preparation.file, short));
             }
             motions.push(motion);
         }
         let skeleton = skeleton.ok_or_else(|| Failure::user("no motion to learn"))?;
-        Run::create(&folder, preset.plan.clone(), skeleton, motions).map_err(|e| preset.failure(e))
+        Run::create(folder, preset.plan.clone(), skeleton, motions).map_err(|e| preset.failure(e))
     }
 
     /// A finished motion has its character; a clip takes the preset's, unless another is asked for.
@@ -195,10 +200,12 @@ impl Args {
     fn folder(&self, preparations: &[Preparation], printer: &Printer) -> Outcome<PathBuf> {
         if let Some(out) = &self.out {
             if locate::is_run(out) {
-                let out = out.display();
-                return Err(Failure::user(format!(
-                    "`{out}` holds a run already, choose another `--out`, or go on with `--resume {out}`"
-                )));
+                return Err(
+                    Failure::input(out, "already holds a run").with_remedy(format!(
+                        "choose another folder with `--out`, or resume that run with `--resume {}`",
+                        out.display()
+                    )),
+                );
             }
             return Ok(out.clone());
         }
@@ -224,13 +231,13 @@ impl Args {
     fn preset(&self) -> Outcome<Preset> {
         let mut preset = Preset::load(&self.preset)?;
         if self.perturb {
-            let task = &mut preset.plan.task;
-            task.perturbations = task.perturbations.or_usual();
+            let perturbations = preset.plan.task.perturbations_mut();
+            *perturbations = perturbations.or_usual();
         }
         preset.change(&self.set)?;
         let plan = &mut preset.plan;
         if plan.samples == 0 {
-            return Err(Failure::user(TrainError::Zero("samples")));
+            return Err(Failure::user("samples is 0").with_remedy("set it to 1 or more"));
         }
         plan.samples = self.samples.unwrap_or(plan.samples);
         plan.seed = self.seed.unwrap_or(plan.seed);
@@ -256,48 +263,46 @@ fn farewell(run: &Run) -> String {
     )
 }
 
-/// A run that can't be written any more, with a full disk for one: what was saved last is whole.
+/// A run that can't be written any more, because the disk is full for one: what was saved last is whole.
 fn unwritten(run: &Run, error: RunError) -> Failure {
-    runs::failure(error).with_remedy(format!(
-        "check its permissions and the room there, then go on with `{} train --resume {}`",
+    let resume = format!(
+        "check its permissions and the free space there, then go on with `{} train --resume {}`",
         program(),
         run.dir().display()
-    ))
+    );
+    match error.is_write() {
+        true => Failure::from(error).with_remedy(resume),
+        false => Failure::from(error),
+    }
 }
 
 /// Learns until the samples or the time are used up, or somebody wants to stop. Checkpoints stand between rounds,
 /// where a run resumes to the same bits.
-fn session(
-    run: &Run,
-    trainer: &mut Trainer,
-    time: Option<Duration>,
-    printer: &Printer,
-) -> Outcome<End> {
+fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Outcome<End> {
     let begun = Instant::now();
-    let mut progress = Progress::new(run, trainer, printer);
+    let progress = Progress::new(session, printer);
     let stop = Stop::on_ctrl_c({
-        let (bar, printer, text) = (progress.bar(), *printer, farewell(run));
+        let (bar, printer, text) = (progress.bar(), *printer, farewell(session.run()));
         move || {
             bar.finish_and_clear();
             printer.say(&text);
         }
     })?;
     let end = loop {
-        let metrics = trainer.iterate().map_err(runs::learn_failure)?;
-        let line = progress.line(&metrics);
-        run.log(&line).map_err(|e| unwritten(run, e))?;
-        progress.show(&metrics, line, printer)?;
+        let iteration = session.iterate();
+        let iteration = iteration.map_err(|e| unwritten(session.run(), e))?;
+        progress.show(&iteration, printer)?;
         if stop.is_wanted() {
             progress.say("ending this round");
         }
-        if !trainer.is_done() && !trainer.is_between_rounds() {
+        if !session.can_be_saved() {
             continue;
         }
-        finish::save(run, trainer).map_err(|e| unwritten(run, e))?;
+        session.save().map_err(|e| unwritten(session.run(), e))?;
         if stop.is_wanted() {
             break End::Interrupted;
         }
-        if trainer.is_done() {
+        if session.is_done() {
             break End::Done;
         }
         if time.is_some_and(|time| begun.elapsed() >= time) {

@@ -7,38 +7,23 @@ use crate::recording;
 use crate::runs;
 use crate::verbs::{eval, replay};
 use crate::viewer::{self, Viewer};
-use mimic::evaluate::{Options, Start};
-use mimic::learn::{Run, RunError, Trainer};
+use mimic::evaluate::Options;
+use mimic::run::{Run, Session, files};
+use mimic::task::{EpisodeStart, StartState};
 use std::path::{Path, PathBuf};
 
 /// Seconds of a looping motion in the recording of a finished run.
 const REPLAY_S: f64 = 10.0;
 
-fn recording_file(run: &Run) -> PathBuf {
-    run.dir().join("replay.rrd")
-}
-
-fn evaluation(run: &Run) -> PathBuf {
-    run.dir().join(runs::EVALUATION)
-}
-
-/// Saves what was learned. Results of an older policy don't stay beside a newer one, so whoever finds some knows
-/// that the run was finished.
-pub fn save(run: &Run, trainer: &Trainer) -> Result<(), RunError> {
-    for outdated in [evaluation(run), recording_file(run)] {
-        std::fs::remove_file(outdated).ok();
-    }
-    run.save(trainer)
-}
-
 /// Measures and records what was learned.
-pub fn finish(run: &Run, printer: &Printer) -> Outcome {
+pub fn finish(session: &Session, printer: &Printer) -> Outcome {
+    let run = session.run();
     let options = Options {
         perturbations: runs::perturbations(run, false),
         ..Options::default()
     };
     let results = runs::evaluate(run, &options, printer)?;
-    runs::keep(run, &results)?;
+    run.keep_evaluation(&results)?;
     let recorded = record(run, printer)?;
     if printer.is_json() {
         return Ok(());
@@ -51,23 +36,27 @@ pub fn finish(run: &Run, printer: &Printer) -> Outcome {
     printer.text(&format!("{folder}\n{}{look}", eval::text(&results)))
 }
 
-/// A run that has learned all it will: what a killed session left out is made up for.
-pub fn make_up(run: &Run, trainer: &Trainer, printer: &Printer) -> Outcome {
+/// A run that has learned all it will: makes up for what a killed session left out.
+pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
+    let run = session.run();
     let folder = run.dir().display();
-    let recorded = !recording::AVAILABLE || recording_file(run).exists();
-    if evaluation(run).exists() && recorded {
-        let (samples, mimic) = (trainer.samples(), program());
+    let is_there = |name: &str| run.dir().join(name).exists();
+    let recorded = !recording::AVAILABLE || is_there(files::RECORDING);
+    if is_there(files::EVALUATION) && recorded {
+        let (samples, mimic) = (session.trainer().samples(), program());
         return Err(Failure::user(format!(
-            "`{folder}` is finished, it has learned from all its {samples} samples: \
-             measure it with `{mimic} eval {folder}`, watch it with `{mimic} replay {folder} --rerun`"
+            "`{folder}` is finished: it has learned from all its {samples} samples"
+        ))
+        .with_remedy(format!(
+            "measure it with `{mimic} eval {folder}`, or watch it with `{mimic} replay {folder} --rerun`"
         )));
     }
     printer.note(format!(
-        "`{folder}` has learned from all its samples, what is missing is its evaluation or recording"
+        "`{folder}` has learned from all its samples; only its evaluation or its recording is missing"
     ));
     // The checkpoint is written first, so the policy may be that of the round before.
-    save(run, trainer).map_err(|e| unwritten(run, e))?;
-    finish(run, printer)
+    session.save().map_err(|e| unwritten(run, e))?;
+    finish(session, printer)
 }
 
 /// The recording's file; `None` where the agent has nothing to show, or this build can't write recordings.
@@ -75,9 +64,10 @@ fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
     if !recording::AVAILABLE {
         return Ok(None);
     }
-    match runs::record(run, 0, (Start::At(0.0), None), REPLAY_S) {
+    let start = EpisodeStart::new(0, StartState::Reference(0.0));
+    match runs::record(run, start, REPLAY_S) {
         Ok(shown) => {
-            let file = recording_file(run);
+            let file = run.dir().join(files::RECORDING);
             replay::save(&shown, &file, run.dir())?;
             Ok(Some(file))
         }

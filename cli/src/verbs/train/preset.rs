@@ -3,9 +3,7 @@
 use super::setting;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::runs;
-use mimic::learn::{LearnError, PRESETS, Plan, RunError, TrainError, preset};
-use mimic::task::TaskError;
+use mimic::run::{PRESETS, Plan, RunError, files, preset};
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -39,7 +37,7 @@ impl Preset {
         let plan =
             parse(&text).map_err(|e| Failure::input(&file, format!("not a training plan: {e}")))?;
         if plan.samples == 0 {
-            return Err(Failure::input(&file, TrainError::Zero("samples")));
+            return Err(Failure::input(&file, "samples is 0").with_remedy("set it to 1 or more"));
         }
         Ok(Self {
             plan,
@@ -66,8 +64,8 @@ impl Preset {
 /// Why a run can't be made or go on; a wrong setting is that of the `file` it stands in.
 pub fn failure(file: Option<&Path>, error: RunError) -> Failure {
     match file {
-        Some(file) if is_setting(&error) => Failure::input(file, error),
-        _ => runs::failure(error),
+        Some(file) if error.is_setting() => Failure::in_file(file, error),
+        _ => Failure::from(error),
     }
 }
 
@@ -83,7 +81,7 @@ fn file(wanted: &Path) -> Outcome<PathBuf> {
             names.join(", ")
         ))
     })?;
-    Ok(run.join(locate::RUN_CONFIG))
+    Ok(run.join(files::CONFIG))
 }
 
 /// Reads from the text in both cases, so that errors say line and column.
@@ -93,22 +91,6 @@ fn parse(text: &str) -> serde_json::Result<Plan> {
         return serde_json::from_str(text).map(|Config { plan }| plan);
     }
     serde_json::from_str(text)
-}
-
-fn is_setting(error: &RunError) -> bool {
-    let RunError::Train(error) = error else {
-        return false;
-    };
-    matches!(
-        error,
-        TrainError::Zero(_)
-            | TrainError::FinalStd(_)
-            | TrainError::FinalRate(_)
-            | TrainError::Task(
-                TaskError::Setting { .. } | TaskError::NoSuchTerm { .. } | TaskError::Range { .. }
-            )
-            | TrainError::Learn(LearnError::Setting { .. })
-    )
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Single values of a plan, by their path: `ppo.gamma=0.99`.
 
-use mimic::learn::Plan;
+use mimic::run::Plan;
 use serde_json::Value;
 use strsim::levenshtein;
 
@@ -69,33 +69,38 @@ fn distance(typed: &str, name: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mimic::task::Actions;
+    use mimic::task::{Actions, ImitationSettings, Terminations};
 
     #[test]
     fn a_change_changes_one_value() {
         let plan = Plan::default();
-        let mut expected = plan.clone();
-        expected.task.terminations.distance = Some(0.4);
-        assert_eq!(
-            change(&plan, "task.terminations.distance=0.4"),
-            Ok(expected.clone())
-        );
-        assert_eq!(
-            change(&plan, "/task/terminations/distance=0.4"),
-            Ok(expected)
-        );
-        let free =
-            change(&plan, "task.terminations.distance=null").map(|p| p.task.terminations.distance);
-        assert_eq!(free, Ok(None));
+        let of = |distance| Plan {
+            task: ImitationSettings {
+                terminations: Terminations {
+                    distance,
+                    ..Terminations::default()
+                },
+                ..ImitationSettings::default()
+            }
+            .into(),
+            ..Plan::default()
+        };
+        for path in ["task.terminations.distance", "/task/terminations/distance"] {
+            let changed = change(&plan, &format!("{path}=0.4"));
+            assert_eq!(changed, Ok(of(Some(0.4))));
+        }
+        let free = change(&plan, "task.terminations.distance=null");
+        assert_eq!(free, Ok(of(None)));
         let wide = change(&plan, "hidden=[64, 32]").map(|p| p.hidden);
         assert_eq!(wide, Ok(vec![64, 32]));
         let smooth = change(&plan, "activation=tanh").map(|p| serde_json::json!(p.activation));
         assert_eq!(smooth, Ok("tanh".into()));
         let whole = change(&plan, r#"task.actions={"kind": "absolute", "reach": 1}"#);
-        assert_eq!(
-            whole.map(|p| p.task.actions),
-            Ok(Actions::Absolute { reach: 1.0 })
-        );
+        let absolute = ImitationSettings {
+            actions: Actions::Absolute { reach: 1.0 },
+            ..ImitationSettings::default()
+        };
+        assert_eq!(whole.map(|p| p.task), Ok(absolute.into()));
     }
 
     #[test]

@@ -1,0 +1,214 @@
+//! Episodes from many starts, and what they say together.
+
+use super::agent::{Agent, EvaluateError};
+use super::episode::perform;
+use crate::sim::LANES;
+use crate::task::{
+    Episode, EpisodeStart, Failure, Good, Measure, Perturbations, StartState, Task, Unit, mean,
+};
+use rayon::prelude::*;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+
+/// What to evaluate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Episodes, whose start phases are spread evenly from the first frame on.
+    pub episodes: usize,
+    /// Length of an episode of a case that goes on for ever, seconds; any other is performed to its end.
+    pub seconds: f64,
+    /// Perform the same phases a second time, disturbed by these ranges; the number of the phase is the seed.
+    pub perturbations: Option<Perturbations>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            episodes: 32,
+            seconds: 20.0,
+            perturbations: None,
+        }
+    }
+}
+
+/// What an evaluation found. In JSON every measure is a field by its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evaluation {
+    /// Episodes that start in the reference's state.
+    pub episodes: usize,
+    /// Survival first, then the task's own measures, then the return.
+    pub measures: Vec<Measure>,
+    /// The episodes that failed.
+    pub failures: Vec<FailedEpisode>,
+    /// One more episode, from standing still in the rest pose.
+    pub from_rest: Disturbed,
+    /// The same phases again, disturbed. Where the reference follows whoever is pushed, errors are measured from there, and
+    /// no agent fails by being far from where the reference would have been.
+    pub perturbed: Option<Disturbed>,
+}
+
+impl Evaluation {
+    /// The measure of this name.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        find(&self.measures, name)
+    }
+}
+
+/// An agent that has more to do than to perform its task: the measures that still mean something.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disturbed {
+    /// How many episodes were performed.
+    pub episodes: usize,
+    /// As in [`Evaluation::measures`].
+    pub measures: Vec<Measure>,
+    /// The episodes that failed.
+    pub failures: Vec<FailedEpisode>,
+}
+
+impl Disturbed {
+    /// The measure of this name.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        find(&self.measures, name)
+    }
+}
+
+fn find(measures: &[Measure], name: &str) -> Option<f64> {
+    let measure = measures.iter().find(|measure| measure.name == name);
+    measure.map(|measure| measure.value)
+}
+
+/// An episode that failed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FailedEpisode {
+    /// Where it started, as a share of all possible starts.
+    pub start: f64,
+    /// Seconds before the failure.
+    pub survived_s: f64,
+    /// Why it failed.
+    pub failure: Failure,
+}
+
+impl FailedEpisode {
+    fn of(episode: &Episode) -> Option<Self> {
+        let StartState::Reference(start) = episode.start.state else {
+            return None;
+        };
+        Some(Self {
+            start,
+            survived_s: episode.survived as f64 / episode.control_hz,
+            failure: episode.failure?,
+        })
+    }
+}
+
+/// Performs deterministic episodes of a case from evenly spread phases, and one from rest, and measures them. Episodes run
+/// in parallel and are gathered in order.
+///
+/// # Errors
+/// A task of another shape than the agent's.
+pub fn evaluate<A: Agent>(
+    agent: &A,
+    case: usize,
+    options: &Options,
+) -> Result<Evaluation, EvaluateError> {
+    let count = options.episodes.max(1);
+    let start = |n: usize| StartState::Reference(n as f64 / count as f64);
+    let phases = (0..count).map(|n| EpisodeStart::new(case, start(n)));
+    let rest = EpisodeStart::new(case, StartState::Rest);
+    let disturbed = options.perturbations.into_iter().flat_map(|ranges| {
+        (0..count).map(move |n| EpisodeStart {
+            disturbance: Some((ranges, n as u64)),
+            ..EpisodeStart::new(case, start(n))
+        })
+    });
+    let all: Vec<EpisodeStart> = phases.chain([rest]).chain(disturbed).collect();
+    let episodes: Result<Vec<Vec<Episode>>, EvaluateError> = all
+        .par_chunks(LANES)
+        .map(|starts| perform(agent, starts, options.seconds))
+        .collect();
+    let episodes = episodes?.concat();
+    Ok(gather(agent.task().as_ref(), count, &episodes))
+}
+
+/// The first `count` of the episodes are undisturbed, the next one starts from rest, the others are disturbed.
+fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
+    let (undisturbed, disturbed) = episodes.split_at(count + 1);
+    let (phases, rest) = undisturbed.split_at(count);
+    let more = |episodes: &[Episode]| {
+        let measures = measures(task, episodes).into_iter();
+        Disturbed {
+            episodes: episodes.len(),
+            measures: measures.filter(|m| m.holds_disturbed).collect(),
+            failures: failures(episodes),
+        }
+    };
+    Evaluation {
+        episodes: count,
+        measures: measures(task, phases),
+        failures: failures(phases),
+        from_rest: more(rest),
+        perturbed: (!disturbed.is_empty()).then(|| more(disturbed)),
+    }
+}
+
+fn failures(episodes: &[Episode]) -> Vec<FailedEpisode> {
+    episodes.iter().filter_map(FailedEpisode::of).collect()
+}
+
+/// What is measured of every task, and the task's own measures.
+fn measures(task: &dyn Task, episodes: &[Episode]) -> Vec<Measure> {
+    let from_start = |e: &&Episode| e.start.state == StartState::Reference(0.0);
+    let survival = mean(episodes.iter().map(Episode::survival));
+    let first = mean(episodes.iter().filter(from_start).map(Episode::survival));
+    let rewards = mean(episodes.iter().map(Episode::normalized_return));
+    let mut all = vec![
+        Measure::new("survival", "survival", survival)
+            .good(Good::High, Unit::Share)
+            .holding_disturbed(),
+        Measure::new(
+            "survival_from_start",
+            "survival, from the first frame",
+            first,
+        )
+        .good(Good::High, Unit::Share),
+    ];
+    all.extend(task.measures(episodes));
+    all.push(
+        Measure::new("normalized_return", "normalised return", rewards)
+            .good(Good::High, Unit::Score)
+            .holding_disturbed(),
+    );
+    all
+}
+
+/// Writes measures as fields.
+fn fields<M: SerializeMap>(
+    map: &mut M,
+    episodes: usize,
+    measures: &[Measure],
+    failures: &[FailedEpisode],
+) -> Result<(), M::Error> {
+    map.serialize_entry("episodes", &episodes)?;
+    for measure in measures {
+        map.serialize_entry(measure.name, &measure.value)?;
+    }
+    map.serialize_entry("failures", failures)
+}
+
+impl Serialize for Evaluation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        fields(&mut map, self.episodes, &self.measures, &self.failures)?;
+        map.serialize_entry("from_rest", &self.from_rest)?;
+        map.serialize_entry("perturbed", &self.perturbed)?;
+        map.end()
+    }
+}
+
+impl Serialize for Disturbed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        fields(&mut map, self.episodes, &self.measures, &self.failures)?;
+        map.end()
+    }
+}

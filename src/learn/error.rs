@@ -1,0 +1,91 @@
+//! Why learning can't begin or go on.
+
+use crate::explain::{Explain, Explanation, explained};
+
+/// Why learning can't begin or go on.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LearnError {
+    /// Something of the wrong length.
+    Length {
+        /// What it is.
+        what: String,
+        /// Its length.
+        found: usize,
+        /// The length that is needed.
+        expected: usize,
+    },
+    /// A setting out of its range.
+    Setting {
+        /// Its path in the settings.
+        name: &'static str,
+        /// What it was set to.
+        value: String,
+        /// What it can be, in words.
+        range: &'static str,
+    },
+    /// An observation that isn't a number.
+    Observation {
+        /// Which number of the observation.
+        column: usize,
+    },
+    /// A return or an advantage that isn't a number.
+    NotFinite {
+        /// What it is.
+        what: &'static str,
+        /// Which sample of the batch.
+        sample: usize,
+    },
+    /// A gradient that isn't a number.
+    Diverged {
+        /// Pass over the batch, from 0.
+        epoch: usize,
+        /// Part of the batch, from 0.
+        minibatch: usize,
+    },
+    /// A saved state of another network.
+    Network {
+        /// The network that was saved.
+        found: String,
+        /// The network that goes on.
+        expected: String,
+    },
+}
+
+impl Explain for LearnError {
+    fn explain(&self) -> Explanation {
+        match self {
+            Self::Length {
+                what,
+                found,
+                expected,
+            } => Explanation::input(format!(
+                "{what} has {found} values where {expected} are needed"
+            ))
+            .remedy("use files of one and the same run"),
+            Self::Setting { name, value, range } => {
+                Explanation::input(format!("{name} is {value}"))
+                    .remedy(format!("set it to {range}"))
+            }
+            Self::Observation { column } => {
+                Explanation::work(format!("observation {column} is not finite"))
+                    .remedy("look for a simulation that diverged or a division by zero")
+            }
+            Self::NotFinite { what, sample } => {
+                Explanation::work(format!("{what} are not finite at sample {sample}"))
+                    .remedy("look for a simulation that diverged")
+            }
+            Self::Diverged { epoch, minibatch } => Explanation::work(format!(
+                "the gradient is not finite in epoch {epoch}, minibatch {minibatch}"
+            ))
+            .remedy(
+                "lower the learning rate, or look for rewards and observations that are not finite",
+            ),
+            Self::Network { found, expected } => Explanation::input(format!(
+                "the saved state is for the network {found}, not {expected}"
+            ))
+            .remedy("train into a new folder, or use the saved configuration"),
+        }
+    }
+}
+
+explained!(LearnError);

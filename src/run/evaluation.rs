@@ -1,0 +1,63 @@
+//! How well a run performs its motions.
+
+use super::error::RunError;
+use super::files;
+use super::folder::Run;
+use crate::evaluate::{Agent, Evaluation, Options, evaluate};
+use crate::task::Case;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// How well a run performs one of its motions.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaseEvaluation {
+    /// Name of the motion.
+    pub motion: String,
+    /// Length of an episode from the first frame.
+    pub seconds: f64,
+    /// What was measured.
+    #[serde(flatten)]
+    pub evaluation: Evaluation,
+}
+
+impl Run {
+    /// Evaluates the saved policy on every motion of the run.
+    ///
+    /// # Errors
+    /// A run without a policy, or a broken one.
+    pub fn evaluate(&self, options: &Options) -> Result<Vec<CaseEvaluation>, RunError> {
+        let controller = self.controller()?;
+        let cases = controller.task().cases().iter().enumerate();
+        let one = |(number, case): (usize, &Case)| {
+            Ok(CaseEvaluation {
+                motion: case.name.clone(),
+                seconds: case.duration_s.unwrap_or(options.seconds),
+                evaluation: evaluate(&controller, number, options)?,
+            })
+        };
+        cases.map(one).collect()
+    }
+
+    /// Keeps an evaluation as that of the run, in `eval.json`.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn keep_evaluation(&self, results: &[CaseEvaluation]) -> Result<(), RunError> {
+        self.write(files::EVALUATION, &CaseEvaluation::text(results))
+    }
+}
+
+impl CaseEvaluation {
+    /// The evaluation of a run in JSON: the fields of its one motion, or a list of `motions`.
+    pub fn json(results: &[Self]) -> Value {
+        match results {
+            [one] => json!(one),
+            many => json!({ "motions": many }),
+        }
+    }
+
+    /// The same as the text of a file.
+    pub fn text(results: &[Self]) -> String {
+        format!("{:#}\n", Self::json(results))
+    }
+}

@@ -1,0 +1,23 @@
+//! Names of the files in a run's folder.
+
+/// Everything that decides what the run learns; every run has it, from its first moment.
+pub const CONFIG: &str = "config.json";
+/// A line per iteration.
+pub const METRICS: &str = "metrics.jsonl";
+/// All that a resumed run needs to go on.
+pub const CHECKPOINT: &str = "checkpoint.safetensors";
+/// All that it takes to act.
+pub const POLICY: &str = "policy.safetensors";
+/// How well the finished run performs, with the default options.
+pub const EVALUATION: &str = "eval.json";
+/// The finished run's agent beside its reference, for the rerun viewer.
+pub const RECORDING: &str = "replay.rrd";
+/// The physics character, as MJCF.
+pub const SKELETON: &str = "skeleton.xml";
+/// Which body of the character is which slot of the humanoid.
+pub const SLOTS: &str = "skeleton.json";
+
+/// The motion number `index`, which the run learns.
+pub fn reference(index: usize) -> String {
+    format!("reference-{index}.motion")
+}

@@ -1,0 +1,336 @@
+//! The folder of a run: everything needed to resume, replay and reproduce it.
+
+use super::checkpoint::{Checkpoint, PolicyFile};
+use super::controller::Controller;
+use super::error::RunError;
+use super::files;
+use super::plan::Plan;
+use crate::learn::{Metrics, Policy, PolicySpec, Trainer, TrainerState};
+use crate::motion::Motion;
+use crate::skeleton::Skeleton;
+use crate::task::{Block, CharacterModel, Task, TaskSettings, size};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What `config.json` says.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunConfig {
+    format: String,
+    version: u32,
+    skeleton: String,
+    motions: Vec<String>,
+    plan: Plan,
+}
+
+/// What a policy file says beside its network: all that it takes to act.
+#[derive(Serialize, Deserialize)]
+struct PolicyDetails {
+    task: TaskSettings,
+    /// Name of the character.
+    skeleton: String,
+    mjcf: String,
+    slots: String,
+    /// What the policy sees, for readers of the file.
+    #[serde(skip_deserializing)]
+    observation: Vec<Block>,
+}
+
+/// A run on disk.
+pub struct Run {
+    dir: PathBuf,
+    plan: Plan,
+    skeleton: Skeleton,
+    motions: Vec<Motion>,
+}
+
+/// Tensor of the checkpoint that says where episodes begin.
+const STARTS: &str = "starts";
+
+impl Run {
+    /// Makes a run in the folder `dir`, which is created. What can't be trained leaves no folder behind.
+    ///
+    /// # Errors
+    /// A folder that holds a run already or can't be written, or a plan, a character or motions that can't be trained.
+    pub fn create(
+        dir: impl AsRef<Path>,
+        plan: Plan,
+        skeleton: Skeleton,
+        motions: Vec<Motion>,
+    ) -> Result<Self, RunError> {
+        let dir = dir.as_ref();
+        if dir.join(files::CONFIG).exists() {
+            return Err(RunError::Exists(dir.to_owned()));
+        }
+        check(&plan, &skeleton, &motions)?;
+        fs::create_dir_all(dir).map_err(unwritten(dir))?;
+        write(&dir.join(files::SKELETON), skeleton.mjcf.as_bytes())?;
+        write(&dir.join(files::SLOTS), skeleton.slots_json().as_bytes())?;
+        for (i, motion) in motions.iter().enumerate() {
+            motion.save(&dir.join(files::reference(i)))?;
+        }
+        let config = RunConfig {
+            format: "run".to_owned(),
+            version: 1,
+            skeleton: skeleton.name.clone(),
+            motions: (0..motions.len()).map(files::reference).collect(),
+            plan,
+        };
+        let text = serde_json::to_string_pretty(&config)
+            .map_err(|e| corrupt(&dir.join(files::CONFIG), e))?;
+        write(&dir.join(files::CONFIG), text.as_bytes())?;
+        // Files hold single precision: only what is read back from them is learned, so that a resumed run sees the same.
+        Run::open(dir)
+    }
+
+    /// Opens the run in `dir`.
+    ///
+    /// # Errors
+    /// A folder without a run, or with a broken one.
+    pub fn open(dir: impl AsRef<Path>) -> Result<Self, RunError> {
+        let dir = dir.as_ref();
+        let path = dir.join(files::CONFIG);
+        if !path.exists() {
+            return Err(RunError::NoRun(dir.to_owned()));
+        }
+        let text = read(&path)?;
+        let config: Value = serde_json::from_str(&text).map_err(|e| corrupt(&path, e))?;
+        // A newer version may have other fields, so this comes first.
+        if (&config["format"], &config["version"]) != (&json!("run"), &json!(1)) {
+            let reason = format!(
+                "format {} {} is not known to this version",
+                config["format"], config["version"]
+            );
+            return Err(RunError::Config { path, reason });
+        }
+        // From the text, whose lines an error names.
+        let config: RunConfig = serde_json::from_str(&text).map_err(|e| corrupt(&path, e))?;
+        config.plan.check().map_err(|e| RunError::Config {
+            path: path.clone(),
+            reason: e.to_string(),
+        })?;
+        let mjcf = read(&dir.join(files::SKELETON))?;
+        let slots = read(&dir.join(files::SLOTS))?;
+        let mut motions = Vec::new();
+        for name in &config.motions {
+            let plain = Path::new(name)
+                .file_name()
+                .is_some_and(|file| file == name.as_str());
+            if !plain {
+                return Err(RunError::Config {
+                    path,
+                    reason: format!("motion `{name}` is not a plain file name"),
+                });
+            }
+            motions.push(Motion::load(&dir.join(name))?);
+        }
+        Ok(Run {
+            dir: dir.to_owned(),
+            plan: config.plan,
+            skeleton: Skeleton::from_mjcf(&config.skeleton, &mjcf, Some(&slots))?,
+            motions,
+        })
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// What it learns, and how.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The physics character.
+    pub fn skeleton(&self) -> &Skeleton {
+        &self.skeleton
+    }
+
+    /// The motions that it learns.
+    pub fn motions(&self) -> &[Motion] {
+        &self.motions
+    }
+
+    /// A trainer that goes on where the last checkpoint was saved, or starts.
+    ///
+    /// # Errors
+    /// A plan that can't be trained, or a broken checkpoint.
+    pub fn trainer(&self) -> Result<Trainer, RunError> {
+        let task = build(&self.plan.task, &self.skeleton, &self.motions)?;
+        let mut trainer = Trainer::new(self.plan.trainer(), task)?;
+        let path = self.dir.join(files::CHECKPOINT);
+        if path.exists() {
+            let Checkpoint {
+                iteration,
+                learner,
+                normalizer,
+                mut tensors,
+                ..
+            } = Checkpoint::load(&path)?;
+            trainer.restore(TrainerState {
+                iteration,
+                learner,
+                normalizer,
+                starts: tensors.remove(STARTS).unwrap_or_default(),
+            })?;
+        }
+        self.trim_metrics(trainer.iteration())?;
+        Ok(trainer)
+    }
+
+    /// Saves checkpoint and policy, each replaced at once.
+    ///
+    /// # Errors
+    /// A folder that can't be written; the last good files stay.
+    pub fn save(&self, trainer: &Trainer) -> Result<(), RunError> {
+        let TrainerState {
+            iteration,
+            learner,
+            normalizer,
+            starts,
+        } = trainer.state();
+        let policy = PolicyFile {
+            spec: learner.spec.clone(),
+            parameters: learner.parameters.clone(),
+            normalizer: normalizer.clone(),
+            details: json!(PolicyDetails {
+                task: self.plan.task.clone(),
+                skeleton: self.skeleton.name.clone(),
+                mjcf: self.skeleton.mjcf.clone(),
+                slots: self.skeleton.slots_json(),
+                observation: trainer.task().observation().to_vec(),
+            }),
+        };
+        let checkpoint = Checkpoint {
+            iteration,
+            samples: trainer.samples(),
+            learner,
+            normalizer,
+            tensors: [(STARTS.to_owned(), starts)].into(),
+        };
+        checkpoint.save(self.dir.join(files::CHECKPOINT))?;
+        Ok(policy.save(self.dir.join(files::POLICY))?)
+    }
+
+    /// Appends a line to `metrics.jsonl`: the metrics with the run's clock.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn log(&self, line: &Value) -> Result<(), RunError> {
+        let path = self.dir.join(files::METRICS);
+        let mut file = fs::OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .map_err(unwritten(&path))?;
+        // In one piece, so that whoever reads along never finds half a line.
+        file.write_all(format!("{line}\n").as_bytes())
+            .map_err(unwritten(&path))
+    }
+
+    /// Seconds of training so far, as the last line of `metrics.jsonl` tells.
+    pub fn seconds(&self) -> f64 {
+        let text = fs::read_to_string(self.dir.join(files::METRICS)).unwrap_or_default();
+        let last = text.lines().last();
+        let line = last.and_then(|line| serde_json::from_str::<Value>(line).ok());
+        line.and_then(|line| line["seconds"].as_f64())
+            .unwrap_or(0.0)
+    }
+
+    /// Writes a file of the run, such as `eval.json`, replaced at once.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn write(&self, name: &str, text: &str) -> Result<(), RunError> {
+        write(&self.dir.join(name), text.as_bytes())
+    }
+
+    /// The policy, ready to act.
+    ///
+    /// # Errors
+    /// A run without a policy, or a broken one.
+    pub fn controller(&self) -> Result<Controller, RunError> {
+        let path = self.dir.join(files::POLICY);
+        if !path.exists() {
+            return Err(RunError::NoPolicy(self.dir.clone()));
+        }
+        let file = PolicyFile::load(&path)?;
+        let details: PolicyDetails =
+            serde_json::from_value(file.details).map_err(|e| corrupt(&path, e))?;
+        let skeleton = Skeleton::from_mjcf(&details.skeleton, &details.mjcf, Some(&details.slots))?;
+        let task = build(&details.task, &skeleton, &self.motions)?;
+        let (spec, parameters) = (file.spec, file.parameters);
+        Ok(Controller::new(spec, parameters, &file.normalizer, task)?)
+    }
+
+    /// Drops the lines of iterations that the checkpoint doesn't know.
+    fn trim_metrics(&self, iteration: u64) -> Result<(), RunError> {
+        let path = self.dir.join(files::METRICS);
+        if !path.exists() {
+            return Ok(());
+        }
+        let known = |line: &&str| {
+            serde_json::from_str::<Metrics>(line)
+                .is_ok_and(|metrics| metrics.iteration <= iteration)
+        };
+        let text = read(&path)?;
+        let kept: String = text
+            .lines()
+            .filter(known)
+            .map(|line| format!("{line}\n"))
+            .collect();
+        write(&path, kept.as_bytes())
+    }
+}
+
+/// The task that these settings make of a character and its motions.
+fn build(
+    settings: &TaskSettings,
+    skeleton: &Skeleton,
+    motions: &[Motion],
+) -> Result<Arc<dyn Task>, RunError> {
+    let model = Arc::new(CharacterModel::new(skeleton.clone())?);
+    Ok(settings.build(model, motions)?)
+}
+
+/// Whether a plan can be trained: everything that training needs is tried but the environments.
+fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), RunError> {
+    plan.check()?;
+    let task = build(&plan.task, skeleton, motions)?;
+    let spec = PolicySpec {
+        observation: size(task.observation()),
+        action: size(task.action()),
+        hidden: plan.hidden.clone(),
+        activation: plan.activation,
+    };
+    Policy::new(spec)?;
+    Ok(())
+}
+
+fn unwritten(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
+    let path = path.to_owned();
+    move |source| RunError::Write { path, source }
+}
+
+fn corrupt(path: &Path, error: serde_json::Error) -> RunError {
+    RunError::Config {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    }
+}
+
+fn read(path: &Path) -> Result<String, RunError> {
+    fs::read_to_string(path).map_err(|source| RunError::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    crate::file::replace(path, bytes).map_err(unwritten(path))
+}

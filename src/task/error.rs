@@ -1,0 +1,148 @@
+//! Why a task can't be set up or do what it is asked for.
+
+use crate::explain::{Explain, Explanation, explained};
+use crate::motion::MotionError;
+use crate::sim::SimError;
+
+/// Why a task can't be set up or do what it is asked for.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum TaskError {
+    /// A character that can't be simulated.
+    Sim(SimError),
+    /// A motion that can't be used.
+    Motion(MotionError),
+    /// A setting out of its range.
+    Setting {
+        /// Its path in the task's settings.
+        name: &'static str,
+        /// What it was set to.
+        value: f64,
+        /// What it can be, in words.
+        range: &'static str,
+    },
+    /// A reward term with a weight that the reward doesn't have.
+    NoSuchTerm {
+        /// Name of the term.
+        term: &'static str,
+        /// Name of the kernels.
+        kernels: String,
+    },
+    /// A range whose end is below its beginning.
+    Order {
+        /// Its path in the task's settings.
+        name: &'static str,
+        /// Its beginning.
+        low: f32,
+        /// Its end.
+        high: f32,
+    },
+    /// A range that goes too far.
+    Range {
+        /// Its path in the task's settings.
+        name: &'static str,
+        /// The end at fault.
+        value: f32,
+        /// The least that it can be.
+        least: f32,
+    },
+    /// A character whose size can't be told.
+    NoLegs {
+        /// Its name.
+        skeleton: String,
+        /// Height of the hips above the sole, metres.
+        leg: f64,
+    },
+    /// A motion of too few frames.
+    TooShort {
+        /// How many it has.
+        frames: usize,
+    },
+    /// Motions that one policy can't learn together.
+    OtherContacts {
+        /// Name of the first motion.
+        first: String,
+        /// Name of the motion that differs.
+        other: String,
+    },
+    /// No motion at all.
+    NoMotion,
+    /// A case that the task hasn't.
+    NoSuchCase {
+        /// Its number, from 0.
+        number: usize,
+        /// How many there are.
+        cases: usize,
+    },
+}
+
+impl TaskError {
+    /// Whether a setting is at fault.
+    pub fn is_setting(&self) -> bool {
+        matches!(
+            self,
+            Self::Setting { .. }
+                | Self::NoSuchTerm { .. }
+                | Self::Order { .. }
+                | Self::Range { .. }
+        )
+    }
+}
+
+impl From<SimError> for TaskError {
+    fn from(error: SimError) -> Self {
+        Self::Sim(error)
+    }
+}
+
+impl From<MotionError> for TaskError {
+    fn from(error: MotionError) -> Self {
+        Self::Motion(error)
+    }
+}
+
+impl Explain for TaskError {
+    fn explain(&self) -> Explanation {
+        match self {
+            Self::Sim(error) => error.explain(),
+            Self::Motion(error) => error.explain(),
+            Self::Setting { name, value, range } => {
+                Explanation::input(format!("{name} is {value}"))
+                    .remedy(format!("set it to {range}"))
+            }
+            Self::NoSuchTerm { term, kernels } => Explanation::input(format!(
+                "the reward term `{term}` has a weight, but the {kernels} kernels have no such term"
+            ))
+            .remedy("set its weight to 0"),
+            Self::Order { name, low, high } => {
+                Explanation::input(format!("{name} is [{low}, {high}]"))
+                    .remedy("give [least, most], the smaller number first")
+            }
+            Self::Range { name, value, least } => {
+                Explanation::input(format!("{name} is a range with {value} in it"))
+                    .remedy(format!("give [least, most], both from {least} to 100"))
+            }
+            Self::NoLegs { skeleton, leg } => Explanation::input(format!(
+                "skeleton `{skeleton}` is {leg} m tall from hips to sole, so its size can't be judged"
+            ))
+            .remedy("give it slots for hips and legs"),
+            Self::TooShort { frames } => {
+                let frame = if *frames == 1 { "frame" } else { "frames" };
+                Explanation::input(format!("the motion has {frames} {frame}"))
+                    .remedy("give a motion of at least two frames")
+            }
+            Self::OtherContacts { first, other } => Explanation::input(format!(
+                "motions `{first}` and `{other}` put different bodies on the ground, and one policy sees one set of contacts"
+            ))
+            .remedy("train them apart"),
+            Self::NoMotion => Explanation::input("there is no motion to learn")
+                .remedy("give at least one motion"),
+            Self::NoSuchCase { number, cases } => {
+                Explanation::input(format!("there is no motion number {number}"))
+                    .remedy(format!("give a number from 0 to {}", cases.saturating_sub(1)))
+            }
+        }
+    }
+}
+
+explained!(TaskError);

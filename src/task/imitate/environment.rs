@@ -1,0 +1,489 @@
+//! One agent that imitates a reference, episode after episode.
+
+use super::aim::aim;
+use super::observe::{ObservationInputs, observe};
+use super::playback::Playback;
+use super::reference::Reference;
+use super::reward::{Terms, terms};
+use super::settings::{ImitationSettings, Terminations};
+use super::terminate::{failure, mean_distance};
+use crate::clip::LoopMode;
+use crate::sim::{Diverged, Target, World};
+use crate::task::disturbance::{Disturbance, Perturbations};
+use crate::task::dynamics::Dynamics;
+use crate::task::environment::{Draws, Environment};
+use crate::task::error::TaskError;
+use crate::task::model::CharacterModel;
+use crate::task::starts::{Moment, uniform};
+use crate::task::step::{
+    EpisodeStart, Failure, Input, Outcome, Purpose, ReferenceState, StartState, Step,
+};
+use nalgebra::Vector3;
+use rand_chacha::rand_core::Rng;
+use std::sync::Arc;
+
+/// A body this little above the lowest one stands with it, metres. Chosen: the soles of one character differ by less.
+const STANDING: f64 = 0.01;
+
+/// Mean distance of the bodies from their reference beyond which an episode of an evaluation has failed, metres: the
+/// criterion of PHC (Luo et al. 2023, "Perpetual humanoid control for real-time simulated avatars").
+const LOST_M: f32 = 0.5;
+
+/// Seconds that an evaluation gives a motion beyond its own end, so that the motion ends the episode and not the clock.
+const ROOM_AT_THE_END_S: f64 = 1.0;
+
+/// An environment of [`super::Imitate`].
+pub(super) struct Imitation {
+    model: Arc<CharacterModel>,
+    references: Arc<[Arc<Reference>]>,
+    playback: Playback,
+    settings: ImitationSettings,
+    purpose: Purpose,
+    world: World,
+    /// Seconds since the episode began.
+    elapsed: f64,
+    /// The reference at the next control step.
+    next: ReferenceState,
+    /// The reference at each moment of [`super::Observations::ahead`].
+    ahead: Vec<ReferenceState>,
+    dynamics: Dynamics,
+    targets: Vec<Target>,
+    last_action: Vec<f32>,
+    /// Per contact link of the reference.
+    touching: Vec<bool>,
+    disturbance: Option<Disturbance>,
+    /// Impulse that a player asked for, N·s.
+    asked_push: Option<Vector3<f32>>,
+    /// Impulse of the push in the last step, N·s.
+    push: Option<Vector3<f32>>,
+    /// Number of the motion that is imitated, and of the one that it is about to go over into.
+    motion: usize,
+    upcoming: usize,
+    /// Seconds of the episode at which training goes over into another motion.
+    next_change: f64,
+}
+
+impl Imitation {
+    /// An environment at the first frame of the first of `references`.
+    pub fn new(
+        model: Arc<CharacterModel>,
+        references: Arc<[Arc<Reference>]>,
+        settings: &ImitationSettings,
+        purpose: Purpose,
+    ) -> Self {
+        let settings = match purpose {
+            Purpose::Training => *settings,
+            _ => rules_of_evaluation(settings),
+        };
+        let first = references[0].clone();
+        let mut environment = Imitation {
+            world: World::new(&model.character, settings.physics),
+            next: first.blank(),
+            ahead: vec![first.blank(); settings.observations.ahead().len()],
+            targets: vec![Target::Free; model.character.links.len()],
+            last_action: vec![0.0; model.character.dof],
+            touching: Vec::new(),
+            disturbance: None,
+            asked_push: None,
+            push: None,
+            playback: Playback::new(model.clone(), first),
+            model,
+            references,
+            settings,
+            purpose,
+            elapsed: 0.0,
+            dynamics: Dynamics::default(),
+            motion: 0,
+            upcoming: 0,
+            next_change: f64::INFINITY,
+        };
+        environment.reset(0.0);
+        environment
+    }
+
+    /// Starts an episode in the state of the present reference at `time` seconds.
+    pub fn reset(&mut self, time: f64) {
+        self.begin(&self.playback.reference().clone(), time);
+    }
+
+    /// Starts an episode at the first frame of the present reference, but at rest: in the rest pose, on the ground where
+    /// the reference's root is, facing where it faces.
+    pub fn reset_at_rest(&mut self) {
+        self.reset(0.0);
+        let skeleton = &self.model.skeleton;
+        let poses = skeleton.forward(&skeleton.rest_qpos());
+        let raise = nalgebra::Translation3::new(0.0, 0.0, -skeleton.lowest_point(&poses) as f32);
+        let root = poses[0].translation.vector;
+        let center = nalgebra::Translation3::new(-root.x as f32, -root.y as f32, 0.0);
+        let place = raise * self.next.anchor * center;
+        let still = vec![0.0; skeleton.nv];
+        let rest = skeleton.rest_qpos();
+        let mut states = self.model.character.states(skeleton, &rest, &still);
+        for state in &mut states {
+            state.pose = place * state.pose;
+        }
+        let lowest = skeleton.lowest_point(&poses);
+        let stands = |link: &usize| {
+            let body = self.model.character.links[*link].body;
+            skeleton.lowest_point_of(&poses, &[body]) < lowest + STANDING
+        };
+        let reference = self.playback.reference();
+        self.touching = reference.contact_links.iter().map(stands).collect();
+        self.world.reset(&states);
+        self.dynamics = reference.masses().dynamics(&states);
+    }
+
+    fn begin(&mut self, reference: &Arc<Reference>, time: f64) {
+        self.playback.begin(reference, time);
+        self.elapsed = 0.0;
+        self.playback.sample(0.0, &mut self.next);
+        self.world.reset(&self.next.links);
+        self.dynamics = reference.masses().dynamics(self.world.states());
+        // The engine finds contacts only in a step; until then the agent touches what its reference does.
+        self.touching.clone_from(&self.next.contacts);
+        self.last_action.fill(0.0);
+        self.disturbance = None;
+        self.asked_push = None;
+        self.push = None;
+        self.look_ahead();
+    }
+
+    /// Starts an episode of motion number `motion`; a start at rest takes its place from the first frame.
+    fn begin_motion(&mut self, motion: usize, state: StartState) {
+        (self.motion, self.upcoming) = (motion, motion);
+        let reference = self.references[motion].clone();
+        if let Purpose::Evaluation { seconds } = self.purpose {
+            self.settings.episode_s = match reference.loop_mode() {
+                LoopMode::Wrap => seconds,
+                LoopMode::Clamp => reference.duration() + ROOM_AT_THE_END_S,
+            };
+        }
+        let last = reference.last_start(self.settings.physics.control_dt());
+        match state {
+            StartState::Reference(share) => self.begin(&reference, share * last),
+            StartState::Rest => {
+                self.playback.begin(&reference, 0.0);
+                self.reset_at_rest();
+            }
+        }
+    }
+
+    /// Disturbs the episode that was just begun; `seed` alone says how.
+    pub fn disturb(&mut self, ranges: Perturbations, seed: u64) {
+        let disturbance = Disturbance::new(ranges, seed);
+        self.world.vary(disturbance.mass, disturbance.friction);
+        self.disturbance = Some(disturbance);
+    }
+
+    /// Slows the present reference down for another `reference`, if that is slower, and goes over into it, as by
+    /// [`Imitation::change_to`], at the control step of the next second at which the present one comes nearest to it; at
+    /// once where the present one ends.
+    pub fn lead_to(&mut self, reference: &Arc<Reference>) {
+        self.playback
+            .lead_to(reference, self.settings.physics.control_dt());
+        self.look_ahead();
+    }
+
+    /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one, and
+    /// from where the present one has brought the character. Within 0.4 s its pose becomes that of the new reference, and
+    /// within a second its speed; the new one begins at half to one and a half of its own pace, so as to be as fast as the
+    /// present one, and follows the agent along the ground.
+    #[cfg(test)]
+    pub fn change_to(&mut self, reference: &Arc<Reference>) {
+        self.playback.change_to(reference);
+        self.look_ahead();
+    }
+
+    /// Steps of an episode that only the time limit ends.
+    fn longest_steps(&self) -> f64 {
+        (self.settings.episode_s * self.settings.physics.control_hz - 1e-6)
+            .ceil()
+            .max(1.0)
+    }
+
+    /// Least and most seconds between changes of the motion, where training has them.
+    fn transitions_s(&self) -> Option<[f64; 2]> {
+        let training = self.purpose == Purpose::Training && self.references.len() > 1;
+        self.settings.transitions_s.filter(|_| training)
+    }
+
+    /// Draws when training goes over into another motion, seconds from now.
+    fn plan_change(&mut self, draws: &mut Draws) {
+        if let Some([least, most]) = self.transitions_s() {
+            self.next_change = self.elapsed + (least + uniform(draws.rng) * (most - least));
+        }
+    }
+
+    /// In training, goes over into another motion when it is time for that, or where this one ends.
+    fn change_in_time(&mut self, outcome: Outcome, draws: &mut Draws) -> Outcome {
+        let due = outcome == Outcome::Running && self.elapsed >= self.next_change;
+        if self.transitions_s().is_none() || !(due || outcome == Outcome::Finished) {
+            return outcome;
+        }
+        self.upcoming = draws.starts.draw(draws.rng).motion;
+        self.lead_to(&self.references[self.upcoming].clone());
+        self.note_arrival();
+        self.plan_change(draws);
+        Outcome::Running
+    }
+
+    fn note_arrival(&mut self) {
+        if !self.playback.is_leading() {
+            self.motion = self.upcoming;
+        }
+    }
+
+    /// Pushes the trunk when the disturbance or a player wants that.
+    fn push_trunk(&mut self) {
+        let elapsed = self.elapsed;
+        let mass = self.model.skeleton.total_mass() as f32;
+        let due = self.disturbance.as_mut().and_then(|d| d.push(elapsed));
+        let asked = self.asked_push.take();
+        self.push = match (due.map(|change| change * mass), asked) {
+            (Some(due), Some(asked)) => Some(due + asked),
+            (due, asked) => due.or(asked),
+        };
+        if let Some(impulse) = self.push {
+            let link = self.model.character.bodies[self.model.trunk()].link;
+            self.world.push(link, impulse);
+        }
+    }
+
+    /// Moves the reference to the agent along the ground: where a cycle begins, if cycles follow; from the first push on, if
+    /// the disturbance says so; and always once another motion has led into this one, for nobody can say beforehand how fast
+    /// a character gathers speed.
+    fn follow(&mut self) {
+        let dt = self.settings.physics.control_dt();
+        let begins = self.settings.cycles_follow && self.playback.begins_cycle(dt);
+        let disturbance = self.disturbance.as_ref();
+        let pushed = disturbance.is_some_and(Disturbance::is_followed);
+        if begins || pushed || self.playback.was_led_into() {
+            let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
+            let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
+            self.playback.shift(apart);
+        }
+    }
+
+    fn look_ahead(&mut self) {
+        let dt = self.settings.physics.control_dt();
+        self.playback.sample(dt, &mut self.next);
+        let ahead = self.settings.observations.ahead();
+        for (seconds, sample) in ahead.iter().zip(&mut self.ahead) {
+            self.playback.sample(dt + seconds, sample);
+        }
+    }
+
+    fn outcome(&self, reward: f32) -> Outcome {
+        let (states, contacts) = (self.world.states(), self.world.contacts());
+        let reference = self.playback.reference();
+        match failure(
+            &self.settings.terminations,
+            states,
+            &self.next.links,
+            contacts,
+            &reference.contact_links,
+            reward,
+        ) {
+            Some(failure) => Outcome::Failed(failure),
+            None if reference.is_over(self.playback.time()) => Outcome::Finished,
+            None if self.elapsed >= self.settings.episode_s - 1e-9 => Outcome::TimeLimit,
+            None => Outcome::Running,
+        }
+    }
+
+    /// An agent that is measured has also failed where it is lost, whatever rules it was trained under.
+    fn or_lost(&self, outcome: Outcome) -> Outcome {
+        if self.purpose == Purpose::Training || matches!(outcome, Outcome::Failed(_)) {
+            return outcome;
+        }
+        let wanted = self.wanted();
+        match mean_distance(&self.model, self.world.states(), &wanted.links) > LOST_M {
+            true => Outcome::Failed(Failure::Distance),
+            false => outcome,
+        }
+    }
+
+    /// The reference now.
+    pub fn wanted(&self) -> ReferenceState {
+        let mut state = self.playback.reference().blank();
+        self.playback.sample(0.0, &mut state);
+        state
+    }
+
+    /// Compares the agent with the state in which its reference wanted it after this step.
+    fn compare(&self) -> Terms {
+        terms(
+            self.settings.rewards.kernels,
+            &self.model,
+            (self.world.states(), &self.dynamics),
+            (&self.next.links, &self.next.dynamics),
+        )
+    }
+}
+
+/// The rules under which agents are compared: a fall ends an episode, and nothing else that training may have asked for.
+fn rules_of_evaluation(settings: &ImitationSettings) -> ImitationSettings {
+    ImitationSettings {
+        terminations: Terminations {
+            distance: None,
+            fall: true,
+            reward: None,
+        },
+        episode_s: f64::MAX,
+        perturbations: Perturbations::default(),
+        ..*settings
+    }
+}
+
+impl Environment for Imitation {
+    fn start(&mut self, draws: &mut Draws) {
+        let Moment { motion, time } = draws.starts.draw(draws.rng);
+        (self.motion, self.upcoming) = (motion, motion);
+        self.begin(&self.references[motion].clone(), time);
+        if self.settings.perturbations.is_on() {
+            self.disturb(self.settings.perturbations, draws.rng.next_u64());
+        }
+        self.plan_change(draws);
+    }
+
+    fn start_at(&mut self, start: &EpisodeStart) {
+        self.begin_motion(start.case, start.state);
+        if let Some((ranges, seed)) = start.disturbance {
+            self.disturb(ranges, seed);
+        }
+    }
+
+    fn input(&mut self, input: Input) -> Result<(), TaskError> {
+        match input {
+            Input::Case(number) => {
+                let reference = self.references.get(number).cloned();
+                let reference = reference.ok_or(TaskError::NoSuchCase {
+                    number,
+                    cases: self.references.len(),
+                })?;
+                self.upcoming = number;
+                self.lead_to(&reference);
+                self.note_arrival();
+            }
+            Input::Push(impulse) => self.asked_push = Some(impulse),
+        }
+        Ok(())
+    }
+
+    fn observe(&self, out: &mut [f32]) {
+        let inputs = ObservationInputs {
+            links: self.world.states(),
+            dynamics: &self.dynamics,
+            contacts: &self.touching,
+            last_action: &self.last_action,
+            next: &self.next,
+            ahead: &self.ahead,
+        };
+        observe(self.settings.observations, &self.model, &inputs, out);
+    }
+
+    fn begin_step(&mut self, action: &[f32]) {
+        aim(
+            self.settings.actions,
+            &self.model.character,
+            &self.next.links,
+            action,
+            &mut self.targets,
+        );
+        self.world.set_targets(&self.targets);
+        self.last_action.copy_from_slice(action);
+        self.push_trunk();
+    }
+
+    fn end_step(&mut self, stepped: Result<(), Diverged>, draws: Option<&mut Draws>) -> Step {
+        let dt = self.settings.physics.control_dt();
+        self.elapsed += dt;
+        self.playback.advance(dt);
+        let kernels = self.settings.rewards.kernels;
+        if stepped.is_err() {
+            return Step {
+                reward: 0.0,
+                terms: Terms::default().of(kernels),
+                outcome: Outcome::Failed(Failure::Diverged),
+            };
+        }
+        let pressed = self.world.contacts();
+        let links = self.playback.reference().contact_links.iter();
+        self.touching.clear();
+        self.touching.extend(links.map(|&link| pressed[link]));
+        self.dynamics = self
+            .playback
+            .reference()
+            .masses()
+            .dynamics(self.world.states());
+        let terms = self.compare();
+        let reward = terms.total(&self.settings.rewards);
+        let mut outcome = self.outcome(reward);
+        self.follow();
+        self.playback.change_in_time();
+        self.note_arrival();
+        self.look_ahead();
+        if let Some(draws) = draws {
+            outcome = self.change_in_time(outcome, draws);
+        }
+        Step {
+            reward,
+            terms: terms.of(kernels),
+            outcome: self.or_lost(outcome),
+        }
+    }
+
+    fn world(&self) -> &World {
+        &self.world
+    }
+
+    fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    fn moment(&self) -> Moment {
+        Moment {
+            motion: self.motion,
+            time: self.playback.time(),
+        }
+    }
+
+    fn elapsed_s(&self) -> f64 {
+        self.elapsed
+    }
+
+    fn possible_steps(&self) -> f64 {
+        if self.transitions_s().is_some() {
+            return self.longest_steps();
+        }
+        let limit = self.settings.episode_s - self.elapsed;
+        let left = limit.min(self.playback.left());
+        (left * self.settings.physics.control_hz - 1e-6)
+            .ceil()
+            .max(1.0)
+    }
+
+    fn is_changing(&self) -> bool {
+        self.playback.is_leading()
+    }
+
+    fn reference(&self) -> Option<ReferenceState> {
+        Some(self.wanted())
+    }
+
+    fn dynamics(&self) -> &Dynamics {
+        &self.dynamics
+    }
+
+    fn touching(&self) -> &[bool] {
+        &self.touching
+    }
+
+    fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+
+    fn push(&self) -> Option<Vector3<f32>> {
+        self.push
+    }
+}

@@ -1,0 +1,326 @@
+//! What a task can be told.
+
+use super::reward::{Kernels, TERM_NAMES};
+use crate::sim::Settings;
+use crate::task::disturbance::Perturbations;
+use crate::task::error::TaskError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the network's output means.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum Actions {
+    /// The output is a rotation that is added to the reference's own joint targets.
+    Residual {
+        /// Rotation for an output of 1.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "rad"))]
+        scale: f32,
+    },
+    /// The output is the target itself, as an exponential map: 0 is the middle of each coordinate's range. A hinge is aimed at
+    /// most half a radian beyond its range.
+    Absolute {
+        /// Target for an output of ±1, as a share of the way from the target for 0 to the end of the range; under `from-rest` to
+        /// the farther end.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
+        reach: f32,
+    },
+    /// The output is the target itself, as an exponential map: 0 is the rest pose. A hinge is aimed at most half a radian
+    /// beyond its range.
+    FromRest {
+        /// Target for an output of ±1, as a share of the way from the target for 0 to the end of the range; under `from-rest` to
+        /// the farther end.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
+        reach: f32,
+    },
+}
+
+impl Actions {
+    fn size(&self) -> f64 {
+        match self {
+            Actions::Residual { scale } => f64::from(*scale),
+            Actions::Absolute { reach } | Actions::FromRest { reach } => f64::from(*reach),
+        }
+    }
+}
+
+/// What the policy sees; see [`super::layout`] for the blocks of each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Observations {
+    /// Our own: the agent, its errors against the reference, and the phase, in the root's frame.
+    #[default]
+    Tracking,
+    /// As `tracking`, and where the reference is going: its root, joints and contacts 0.1 and 0.3 s after the next control
+    /// step.
+    TrackingAhead,
+    /// Peng et al. 2018, "DeepMimic", section 4: all bodies in the heading frame, and the phase.
+    Deepmimic,
+    /// Booth & Ivanov 2020: all bodies, the last action, the centre of mass, angular momentum, soles, and the phase.
+    Booth2020,
+}
+
+impl Observations {
+    /// The moments of the reference that are seen beside the next control step's, seconds after it.
+    pub fn ahead(self) -> &'static [f64] {
+        match self {
+            Observations::TrackingAhead => &[0.1, 0.3],
+            _ => &[],
+        }
+    }
+}
+
+/// Weights of the reward terms; what a step earns is divided by their sum. See [`super::Terms`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Rewards {
+    /// Which errors the terms are made of.
+    pub kernels: Kernels,
+    /// Weight of the error of the joints' rotations.
+    #[schemars(range(min = 0.0))]
+    pub pose: f32,
+    /// Weight of the error of the joints' or bodies' angular velocities.
+    #[schemars(range(min = 0.0))]
+    pub velocity: f32,
+    /// Weight of the error of the bodies' positions relative to the root.
+    #[schemars(range(min = 0.0))]
+    pub position: f32,
+    /// Weight of the error of the root's position and rotation.
+    #[schemars(range(min = 0.0))]
+    pub root: f32,
+    /// Weight of the error of the root's linear and angular velocity.
+    #[schemars(range(min = 0.0))]
+    pub root_velocity: f32,
+    /// Weight of the error of the centre of mass's velocity.
+    #[schemars(range(min = 0.0))]
+    pub com: f32,
+    /// Weight of the error of the angular momentum about the centre of mass.
+    #[schemars(range(min = 0.0))]
+    pub angular_momentum: f32,
+    /// Weight of the error of the positions of hands and feet.
+    #[schemars(range(min = 0.0))]
+    pub end_effector: f32,
+    /// Weight of the error of the velocities of hands and feet.
+    #[schemars(range(min = 0.0))]
+    pub end_effector_velocity: f32,
+    /// Weight of the error of the centre of mass's position.
+    #[schemars(range(min = 0.0))]
+    pub com_position: f32,
+}
+
+impl Rewards {
+    /// In the order of [`TERM_NAMES`].
+    pub fn weights(&self) -> [f32; TERM_NAMES.len()] {
+        [
+            self.pose,
+            self.velocity,
+            self.position,
+            self.root,
+            self.root_velocity,
+            self.com,
+            self.angular_momentum,
+            self.end_effector,
+            self.end_effector_velocity,
+            self.com_position,
+        ]
+    }
+
+    /// A weight for a term that the kernels don't have would only make every reward smaller.
+    fn check(&self) -> Result<(), TaskError> {
+        let weights = self.weights().into_iter().zip(self.kernels.has());
+        match TERM_NAMES
+            .iter()
+            .zip(weights)
+            .find(|(_, (weight, has))| !has && *weight != 0.0)
+        {
+            Some((term, _)) => Err(TaskError::NoSuchTerm {
+                term,
+                kernels: self.kernels.to_string(),
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Default for Rewards {
+    fn default() -> Self {
+        Self {
+            kernels: Kernels::Tracking,
+            pose: 0.3,
+            velocity: 0.1,
+            position: 0.25,
+            root: 0.15,
+            root_velocity: 0.1,
+            com: 0.05,
+            angular_momentum: 0.05,
+            end_effector: 0.0,
+            end_effector_velocity: 0.0,
+            com_position: 0.0,
+        }
+    }
+}
+
+/// When an episode fails.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Terminations {
+    /// An episode fails when any body is farther than this from its reference. `null` leaves the rule out.
+    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "m"))]
+    pub distance: Option<f32>,
+    /// An episode fails when a body touches the ground that the reference never puts there.
+    pub fall: bool,
+    /// An episode fails when the reward of a step is below this, as in Booth & Ivanov 2020. `null` leaves the rule out.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub reward: Option<f32>,
+}
+
+impl Default for Terminations {
+    fn default() -> Self {
+        Self {
+            distance: Some(0.5),
+            fall: true,
+            reward: None,
+        }
+    }
+}
+
+/// Everything that a task can be told.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImitationSettings {
+    /// Rates and solver settings of the physics.
+    pub physics: Settings,
+    /// What the policy's output means.
+    pub actions: Actions,
+    /// What the policy sees.
+    pub observations: Observations,
+    /// What the policy is rewarded for.
+    pub rewards: Rewards,
+    /// When an episode fails.
+    pub terminations: Terminations,
+    /// What disturbs the episodes of training.
+    pub perturbations: Perturbations,
+    /// Whether episodes begin at any phase (reference state initialisation) instead of at the first frame alone.
+    pub start_anywhere: bool,
+    /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
+    /// [`ImitationSettings::start_anywhere`].
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub adaptive_starts: f64,
+    /// Time from the start of an episode to its first transition into another motion of the run, and from each to the next: the
+    /// least and the most. `null` keeps an episode to one motion.
+    #[schemars(
+        inner(range(min = 0.1, max = 1e6)),
+        extend("x-ascending" = true, "x-unit" = "s")
+    )]
+    pub transitions_s: Option<[f64; 2]>,
+    /// Whether each cycle of a looping motion begins where the agent's root is along the ground, so that the agent never has to
+    /// catch up. Otherwise the motion goes its own way, until a shove or a transition moves it.
+    pub cycles_follow: bool,
+    /// Longest episode in training.
+    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "s"))]
+    pub episode_s: f64,
+}
+
+impl Default for ImitationSettings {
+    fn default() -> Self {
+        Self {
+            physics: Settings::default(),
+            actions: Actions::Residual { scale: 0.3 },
+            observations: Observations::Tracking,
+            rewards: Rewards::default(),
+            terminations: Terminations::default(),
+            perturbations: Perturbations::default(),
+            start_anywhere: true,
+            adaptive_starts: 0.25,
+            transitions_s: None,
+            cycles_follow: false,
+            episode_s: 10.0,
+        }
+    }
+}
+
+impl ImitationSettings {
+    /// # Errors
+    /// A number that no task can have.
+    pub fn check(&self) -> Result<(), TaskError> {
+        self.rewards.check()?;
+        self.perturbations.check()?;
+        let weights = self.rewards.weights();
+        let least = weights.iter().copied().fold(f32::INFINITY, f32::min);
+        let physics = &self.physics;
+        let positive = f64::MIN_POSITIVE..=1e6;
+        let checks = [
+            ("control_hz", physics.control_hz, 1.0..=1e4, "1 to 10000"),
+            (
+                "steps_per_control",
+                f64::from(physics.steps_per_control),
+                1.0..=1e3,
+                "1 to 1000",
+            ),
+            (
+                "substeps",
+                f64::from(physics.substeps),
+                1.0..=1e3,
+                "1 to 1000",
+            ),
+            ("contact_s", physics.contact_s, 0.0..=1.0, "0 to 1"),
+            ("episode_s", self.episode_s, positive.clone(), "positive"),
+            ("adaptive_starts", self.adaptive_starts, 0.0..=1.0, "0 to 1"),
+            (
+                "the smallest reward weight",
+                f64::from(least),
+                0.0..=f64::MAX,
+                "0 or more",
+            ),
+            (
+                "the sum of the reward weights",
+                f64::from(weights.iter().sum::<f32>()),
+                positive.clone(),
+                "positive",
+            ),
+            (
+                "the distance that ends an episode",
+                f64::from(self.terminations.distance.unwrap_or(1.0)),
+                positive.clone(),
+                "positive",
+            ),
+            (
+                "the reward that ends an episode",
+                f64::from(self.terminations.reward.unwrap_or(0.0)),
+                0.0..=1.0,
+                "0 to 1",
+            ),
+            (
+                "the size of an action",
+                self.actions.size(),
+                positive,
+                "positive",
+            ),
+        ];
+        let [least, most] = self.transitions_s.unwrap_or([1.0, 1.0]);
+        let transitions = [
+            (
+                "the first of transitions_s",
+                least,
+                0.1..=1e6,
+                "0.1 or more",
+            ),
+            (
+                "the second of transitions_s",
+                most,
+                least..=1e6,
+                "no less than the first",
+            ),
+        ];
+        for (name, value, range, text) in checks.into_iter().chain(transitions) {
+            if !range.contains(&value) {
+                return Err(TaskError::Setting {
+                    name,
+                    value,
+                    range: text,
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! When an episode has failed.
+
+use super::settings::Terminations;
+use crate::sim::LinkState;
+use crate::task::model::CharacterModel;
+use crate::task::step::Failure;
+
+/// Distance of the link that is furthest from its reference, metres.
+pub fn furthest(links: &[LinkState], reference: &[LinkState]) -> f32 {
+    links
+        .iter()
+        .zip(reference)
+        .map(|(a, b)| (a.pose.translation.vector - b.pose.translation.vector).norm())
+        .fold(0.0, f32::max)
+}
+
+/// `contacts` holds one flag per link, `allowed` the links that may stand on the ground.
+pub fn failure(
+    rules: &Terminations,
+    links: &[LinkState],
+    reference: &[LinkState],
+    contacts: &[bool],
+    allowed: &[usize],
+    reward: f32,
+) -> Option<Failure> {
+    let lost = |most: f32| furthest(links, reference) > most;
+    if rules.distance.is_some_and(lost) {
+        return Some(Failure::Distance);
+    }
+    let fell = || {
+        contacts
+            .iter()
+            .enumerate()
+            .any(|(link, touches)| *touches && !allowed.contains(&link))
+    };
+    if rules.fall && fell() {
+        return Some(Failure::Fall);
+    }
+    rules
+        .reward
+        .filter(|least| reward < *least)
+        .map(|_| Failure::Reward)
+}
+
+/// Mean distance of the bodies from those of the reference, metres.
+pub fn mean_distance(model: &CharacterModel, links: &[LinkState], reference: &[LinkState]) -> f32 {
+    let sum: f32 = model
+        .positions(links)
+        .zip(model.positions(reference))
+        .map(|(p, q)| (p - q).norm())
+        .sum();
+    sum / model.character.bodies.len() as f32
+}
