@@ -3,7 +3,7 @@
 //!
 //! `MIMIC_WRITE_DOCS=1` writes it.
 
-use mimic::learn::{PRESETS, Plan};
+use mimic::run::{PRESETS, Plan};
 use mimic::schema;
 use serde_json::Value;
 use std::collections::BTreeMap;
