@@ -7,9 +7,10 @@
 //! only where the source says which joint is which bone.
 
 use super::sampling::{MOST_FPS, MOST_TRANSFORMS};
-use super::{Clip, Error, Joint, LoopMode, Margin, Problem, Source};
+use super::stored::{self, floats, isometries, rotations, rounded, translations};
+use super::{Clip, Error, LoopMode, Margin, Problem, Source};
 use crate::file::{self, Flaw, Format, Reader, Writer};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -30,7 +31,7 @@ struct Header {
     name: String,
     fps: f64,
     joints: Vec<String>,
-    /// Joints by bone, as in [`Joint::bone`].
+    /// Joints by bone, as in [`Joint::bone`](super::Joint::bone).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     humanoid: BTreeMap<String, usize>,
     #[serde(rename = "loop")]
@@ -45,9 +46,7 @@ impl Clip {
     /// # Errors
     /// [`Error::File`] when the file can't be written, or the clip has frames of another number of joints.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
-        let writer = self.writer().map_err(|flaw| flaw.of(path, FORMAT))?;
-        Ok(writer.save(path, FORMAT, &self.header())?)
+        Ok(self.writer().save(path.as_ref(), FORMAT, &self.header())?)
     }
 
     /// Reads the clip file `path`.
@@ -73,20 +72,17 @@ impl Clip {
             name: self.name.clone(),
             fps: self.fps,
             joints: self.joints.iter().map(|joint| joint.name.clone()).collect(),
-            humanoid: bones(&self.joints),
+            humanoid: stored::bones(&self.joints),
             loop_mode: self.loop_mode,
             source: self.source.clone(),
             problems: self.problems.clone(),
         }
     }
 
-    fn writer(&self) -> Result<Writer, Flaw> {
+    fn writer(&self) -> Writer {
         let mut writer = Writer::default();
         let j = self.joints.len();
-        writer.push("parent", &[j], parents(&self.joints)?);
-        let rest = || self.joints.iter().map(|joint| &joint.rest);
-        writer.push("rest_translation", &[j, 3], translations(rest()));
-        writer.push("rest_rotation", &[j, 4], rotations(rest()));
+        stored::push_tree(&mut writer, "", &self.joints);
         let Margin { before, after } = &self.margin;
         push_frames(&mut writer, LOCAL, j, &self.frames);
         for (names, frames) in [(BEFORE, before), (AFTER, after)] {
@@ -94,7 +90,7 @@ impl Clip {
                 push_frames(&mut writer, names, j, frames);
             }
         }
-        Ok(writer)
+        writer
     }
 
     /// The clip that a file's bytes hold.
@@ -102,10 +98,11 @@ impl Clip {
         let reader = Reader::open(bytes, FORMAT)?;
         let header = header(&reader)?;
         let j = header.joints.len();
-        let joints = joints(&reader, header.joints, header.humanoid)?;
+        let mut joints = stored::tree(&reader, "", header.joints)?;
+        stored::name_bones(&mut joints, header.humanoid)?;
         let frames = read_frames(&reader, LOCAL, j)?;
         if frames.is_empty() {
-            return Err(Flaw::content(tensor(LOCAL[0]), "0 frames"));
+            return Err(Flaw::in_tensor(LOCAL[0], "0 frames"));
         }
         let around = |names: [&str; 2]| match reader.has(names[0]) {
             true => read_frames(&reader, names, j),
@@ -164,139 +161,9 @@ fn read_frames(
     if f.saturating_mul(j) > MOST_TRANSFORMS {
         let cause =
             format!("{f} frames of {j} joints, at most {MOST_TRANSFORMS} transforms are read");
-        return Err(Flaw::content(tensor(places), cause));
+        return Err(Flaw::in_tensor(places, cause));
     }
     let rotation = floats(reader, turns, &[Some(f), Some(j), Some(4)])?;
     let local = isometries(turns, &translation, &rotation)?;
     Ok(local.chunks_exact(j).map(<[_]>::to_vec).collect())
-}
-
-/// Joints by the bone that each is said to be.
-fn bones(joints: &[Joint]) -> BTreeMap<String, usize> {
-    let bones = joints.iter().enumerate();
-    bones
-        .filter_map(|(j, joint)| Some((joint.bone.clone()?, j)))
-        .collect()
-}
-
-/// The joints' parents as the file holds them, −1 for a root.
-fn parents(joints: &[Joint]) -> Result<Vec<i32>, Flaw> {
-    let parent = |joint: &Joint| match joint.parent {
-        Some(p) => i32::try_from(p)
-            .map_err(|_| Flaw::content(format!("joint `{}`", joint.name), "too many joints")),
-        None => Ok(-1),
-    };
-    joints.iter().map(parent).collect()
-}
-
-fn translations<'a>(
-    transforms: impl Iterator<Item = &'a Isometry3<f64>>,
-) -> impl Iterator<Item = f32> {
-    transforms.flat_map(|t| [t.translation.x, t.translation.y, t.translation.z].map(|x| x as f32))
-}
-
-fn rotations<'a>(
-    transforms: impl Iterator<Item = &'a Isometry3<f64>>,
-) -> impl Iterator<Item = f32> {
-    let numbers = |t: &Isometry3<f64>| [t.rotation.w, t.rotation.i, t.rotation.j, t.rotation.k];
-    transforms.flat_map(move |t| numbers(t).map(|x| x as f32))
-}
-
-/// How an error names a tensor.
-fn tensor(name: &str) -> String {
-    format!("tensor `{name}`")
-}
-
-/// The numbers of a tensor, all finite.
-fn floats(reader: &Reader, name: &str, shape: &[Option<usize>]) -> Result<Vec<f64>, Flaw> {
-    let numbers = reader.tensor::<f32>(name, shape)?;
-    match numbers.iter().position(|x| !x.is_finite()) {
-        Some(at) => {
-            let cause = format!("element {at} is not a finite number");
-            Err(Flaw::content(tensor(name), cause))
-        }
-        None => Ok(numbers.into_iter().map(f64::from).collect()),
-    }
-}
-
-fn isometries(
-    name: &str,
-    translation: &[f64],
-    rotation: &[f64],
-) -> Result<Vec<Isometry3<f64>>, Flaw> {
-    let places = translation.as_chunks::<3>().0;
-    let turns = rotation.as_chunks::<4>().0;
-    let isometry = |(i, (t, q)): (usize, (&[f64; 3], &[f64; 4]))| {
-        let q = stored_rotation(Quaternion::new(q[0], q[1], q[2], q[3]));
-        let q = q.ok_or_else(|| Flaw::content(tensor(name), format!("rotation {i} is zero")))?;
-        Ok(Isometry3::from_parts(
-            Translation3::new(t[0], t[1], t[2]),
-            q,
-        ))
-    };
-    places.iter().zip(turns).enumerate().map(isometry).collect()
-}
-
-/// A stored quaternion that is a rotation but for single precision is taken as it stands: what was saved and what is
-/// loaded are the same, to the bit.
-pub(crate) fn stored_rotation(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
-    if (q.norm_squared() - 1.0).abs() < 1e-6 {
-        return Some(UnitQuaternion::new_unchecked(q));
-    }
-    UnitQuaternion::try_new(q, 1e-3)
-}
-
-fn rounded(at: &Isometry3<f64>) -> Isometry3<f64> {
-    let single = |x: f64| f64::from(x as f32);
-    let q = at.rotation.coords.map(single);
-    Isometry3::from_parts(
-        Translation3::from(at.translation.vector.map(single)),
-        UnitQuaternion::new_unchecked(Quaternion::from(q)),
-    )
-}
-
-/// The joints of these names, which of them are which bone, and where each hangs.
-fn joints(
-    reader: &Reader,
-    names: Vec<String>,
-    bones: BTreeMap<String, usize>,
-) -> Result<Vec<Joint>, Flaw> {
-    let j = Some(names.len());
-    let parents = reader.tensor::<i32>("parent", &[j])?;
-    let translation = floats(reader, "rest_translation", &[j, Some(3)])?;
-    let rotation = floats(reader, "rest_rotation", &[j, Some(4)])?;
-    let rest = isometries("rest_rotation", &translation, &rotation)?;
-    let joint = |(j, ((name, &parent), rest)): (usize, ((String, &i32), Isometry3<f64>))| {
-        let parent = parent_of(j, &name, parent)?;
-        Ok(Joint {
-            name,
-            parent,
-            rest,
-            bone: None,
-        })
-    };
-    let joints = names.into_iter().zip(&parents).zip(rest).enumerate();
-    let mut joints: Vec<Joint> = joints.map(joint).collect::<Result<_, _>>()?;
-    for (bone, j) in bones {
-        let Some(joint) = joints.get_mut(j) else {
-            let cause = format!("bone `{bone}` is joint {j}, which isn't there");
-            return Err(Flaw::content("humanoid", cause));
-        };
-        joint.bone = Some(bone);
-    }
-    Ok(joints)
-}
-
-/// The parent of joint `j` that the file gives, which has to stand before it.
-fn parent_of(j: usize, name: &str, parent: i32) -> Result<Option<usize>, Flaw> {
-    if parent == -1 {
-        return Ok(None);
-    }
-    match usize::try_from(parent) {
-        Ok(before) if before < j => Ok(Some(before)),
-        _ => {
-            let cause = format!("joint {j} `{name}` has parent {parent}, which isn't before it");
-            Err(Flaw::content(tensor("parent"), cause))
-        }
-    }
 }

@@ -7,12 +7,12 @@ mod file;
 mod margin;
 mod problem;
 mod sampling;
+pub(crate) mod stored;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use carry::carry;
 pub use error::Error;
-pub(crate) use file::stored_rotation;
 pub use margin::Margin;
 pub use problem::{Problem, Severity};
 pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};

@@ -78,6 +78,11 @@ impl Flaw {
         }
     }
 
+    /// A tensor whose numbers can't be used.
+    pub(crate) fn in_tensor(name: &str, cause: impl Into<String>) -> Self {
+        Self::content(format!("tensor `{name}`"), cause)
+    }
+
     /// The error of a file that has this flaw.
     pub(crate) fn of(self, path: &Path, format: Format) -> FileError {
         FileError {

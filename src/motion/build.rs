@@ -85,6 +85,7 @@ impl Motion {
             bodies,
             tracks,
             report: None,
+            source: None,
         }
     }
 

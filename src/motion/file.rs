@@ -4,10 +4,19 @@
 //! Tensors are f64, for F frames, B bodies and C contact bodies: `qpos` \[F, nq\] and `qvel` \[F, nv\] in MuJoCo's order,
 //! `body_position` \[F, B, 3\], `body_rotation` \[F, B, 4\] (w, x, y, z), `phase` \[F\], `com`, `com_velocity`,
 //! `linear_momentum` and `angular_momentum` \[F, 3\], `contact` u8 \[F, C\], `root_wrench_residual` \[F, 6\]. A file that
-//! another program wrote may have f32 in place of f64. The metadata has the fields of [`Header`].
+//! another program wrote may have f32 in place of f64.
+//!
+//! A motion that was retargeted has its source too, of J joints, all f32 but the parents: the joint tree `source_parent` i32 \[J\],
+//! `source_rest_translation` \[J, 3\], `source_rest_rotation` \[J, 4\]; the transforms in the first frame
+//! `source_first_translation` and `source_first_rotation`; and tracks `source_rotation` \[F, R, 4\] and
+//! `source_translation` \[F, S, 3\] of joints that the metadata lists.
+//!
+//! The metadata has the fields of [`Header`].
 
-use super::{Cycle, Motion, MotionError, RetargetReport, Tracks};
-use crate::clip::{LoopMode, MOST_FPS, stored_rotation};
+use super::source::RigHeader;
+use super::{Cycle, Motion, MotionError, RetargetReport, SourceRig, Tracks};
+use crate::clip::stored::stored_rotation;
+use crate::clip::{LoopMode, MOST_FPS};
 use crate::file::{self, Flaw, Format, Reader, Writer};
 use nalgebra::{Isometry3, Quaternion, Translation3, Vector3, Vector6};
 use safetensors::tensor::{Dtype, TensorView};
@@ -34,6 +43,8 @@ struct Header {
     contact_bodies: Vec<String>,
     #[serde(default)]
     report: Option<RetargetReport>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    source: Option<RigHeader>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -82,6 +93,7 @@ impl Motion {
             bodies: self.body_names.clone(),
             contact_bodies: self.contact_bodies.iter().map(name).collect(),
             report: self.report.clone(),
+            source: self.source.as_ref().map(SourceRig::header),
         }
     }
 
@@ -105,6 +117,9 @@ impl Motion {
         let rotations = poses().flat_map(rotation);
         writer.push("body_rotation", &[frames, bodies, 4], rotations);
         push_tracks(&mut writer, &self.tracks);
+        if let Some(source) = &self.source {
+            source.push(&mut writer, frames);
+        }
         writer
     }
 
@@ -121,6 +136,8 @@ impl Motion {
             &rows("body_position", 3 * bodies)?,
             &rows("body_rotation", 4 * bodies)?,
         )?;
+        let source = header.source;
+        let source = source.map(|header| SourceRig::read(&table.reader, header, frames));
         Ok(Self {
             name: header.name,
             fps: header.fps,
@@ -138,6 +155,7 @@ impl Motion {
             qpos,
             bodies: poses,
             report: header.report,
+            source: source.transpose()?,
         })
     }
 }
@@ -190,7 +208,7 @@ fn poses(positions: &[Vec<f64>], rotations: &[Vec<f64>]) -> Result<Vec<Vec<Isome
     let pose = |(p, r): (&[f64], &[f64])| {
         let shift = Translation3::from(Vector3::from_column_slice(p));
         let turn = stored_rotation(Quaternion::new(r[0], r[1], r[2], r[3]));
-        let zero = || Flaw::content(tensor("body_rotation"), "a rotation is zero");
+        let zero = || Flaw::in_tensor("body_rotation", "a rotation is zero");
         Ok(Isometry3::from_parts(shift, turn.ok_or_else(zero)?))
     };
     positions
@@ -198,11 +216,6 @@ fn poses(positions: &[Vec<f64>], rotations: &[Vec<f64>]) -> Result<Vec<Vec<Isome
         .zip(rotations)
         .map(|(p, r)| p.chunks_exact(3).zip(r.chunks_exact(4)).map(pose).collect())
         .collect()
-}
-
-/// How an error names a tensor.
-fn tensor(name: &str) -> String {
-    format!("tensor `{name}`")
 }
 
 /// Tensors of a file, read as rows of numbers, one row per frame.
@@ -224,7 +237,7 @@ impl Table<'_> {
         let rows = self.rows(name, width)?;
         if rows.len() != frames {
             let cause = format!("{} frames where `qpos` has {frames}", rows.len());
-            return Err(Flaw::content(tensor(name), cause));
+            return Err(Flaw::in_tensor(name, cause));
         }
         Ok(rows)
     }
@@ -254,7 +267,7 @@ impl Table<'_> {
 
     /// `name` with all axes but the first taken as one, of size `width` if given.
     fn rows(&self, name: &str, width: Option<usize>) -> Result<Vec<Vec<f64>>, Flaw> {
-        let wrong = |cause: String| Err(Flaw::content(tensor(name), cause));
+        let wrong = |cause: String| Err(Flaw::in_tensor(name, cause));
         let view = self.reader.view(name)?;
         let Some(values) = numbers(&view) else {
             return wrong("not finite numbers of type F64, F32 or U8".to_owned());

@@ -11,6 +11,7 @@ mod quality;
 mod report;
 mod sample;
 pub mod skate;
+mod source;
 mod summary;
 mod timeline;
 mod torque;
@@ -21,6 +22,7 @@ pub use build::Draft;
 pub use error::MotionError;
 pub use quality::Check;
 pub use report::{MappedJoint, RetargetReport, Spread};
+pub use source::SourceRig;
 pub use summary::{ContactShare, Extent, Summary};
 
 use crate::clip::LoopMode;
@@ -77,6 +79,8 @@ pub struct Motion {
     pub tracks: Tracks,
     /// What retargeting says about the motion; `None` for one that was made in another way.
     pub report: Option<RetargetReport>,
+    /// The rig that it was retargeted from; `None` for a motion that was made in another way, or by an older version.
+    pub source: Option<SourceRig>,
 }
 
 impl Cycle {

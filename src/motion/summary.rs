@@ -141,6 +141,7 @@ mod tests {
                 root_wrench_residual: vec![Vector6::zeros(), pull],
             },
             report: None,
+            source: None,
         }
     }
 

@@ -1,5 +1,7 @@
 //! Stage 7, result: the motion of the fitted coordinates, and a report that measures it against the source.
 
+mod source_rig;
+
 use super::anchor::{Anchor, SourceContact};
 use super::end_effector::EndEffector;
 use super::frames::keep;
@@ -66,6 +68,7 @@ pub(super) fn finish(
     let map = report::mapped(&input.clip, &input.map);
     let report = report::report(model.skeleton, &source, &measured, &motion, map, problems);
     motion.report = Some(report.clone());
+    motion.source = Some(source_rig::source_rig(input, model.skeleton));
     (motion, report)
 }
 
