@@ -293,6 +293,32 @@ fn report() -> RetargetReport {
     }
 }
 
+/// A hip with a finger that turns and a pen that slides, over `frames` frames.
+fn source(frames: usize) -> SourceRig {
+    let joint = |name: &str, parent, bone: Option<&str>| crate::clip::Joint {
+        name: name.into(),
+        parent,
+        rest: Isometry3::translation(0.0, 0.25, 1.0),
+        bone: bone.map(str::to_owned),
+    };
+    // Quarters and eighths are exact in single precision, and so is a half turn.
+    let turn = |f: usize| match f % 2 {
+        0 => UnitQuaternion::identity(),
+        _ => UnitQuaternion::new_unchecked(Quaternion::new(0.0, 0.0, 1.0, 0.0)),
+    };
+    SourceRig {
+        joints: vec![
+            joint("hips", None, Some("hips")),
+            joint("finger", Some(0), None),
+            joint("pen", Some(1), None),
+        ],
+        map: [(crate::humanoid::Slot::Hips, 0)].into(),
+        first: vec![Isometry3::translation(0.5, 0.125, 0.0); 3],
+        rotations: [(1, (0..frames).map(turn).collect())].into(),
+        translations: [(2, vec![Vector3::new(0.0, 0.5, 0.25); frames])].into(),
+    }
+}
+
 /// What retargeting reports is judged, whatever the motion itself looks like.
 #[test]
 fn the_report_is_part_of_the_quality() {
@@ -315,6 +341,7 @@ fn files_come_back_as_they_were() {
     let qvel: Vec<f64> = (0..s.nv).map(|i| (i as f64).sin()).collect();
     let mut motion = Motion::from_poses(&s, draft(&s, steady(&s, &qvel, 20, 60.0), 60.0));
     motion.report = Some(report());
+    motion.source = Some(source(20));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("test.motion");
     motion.save(&path).expect("it can be written");
@@ -339,7 +366,8 @@ fn a_rotation_of_zero_is_an_error() {
 #[test]
 fn damaged_files_never_panic() {
     let s = humanoid();
-    let motion = Motion::from_poses(&s, draft(&s, steady(&s, &vec![0.1; s.nv], 3, 60.0), 60.0));
+    let mut motion = Motion::from_poses(&s, draft(&s, steady(&s, &vec![0.1; s.nv], 3, 60.0), 60.0));
+    motion.source = Some(source(3));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("test.motion");
     motion.save(&path).expect("it can be written");
@@ -358,7 +386,7 @@ fn damaged_files_never_panic() {
             let at = if below(4) == 0 {
                 below(damaged.len())
             } else {
-                below(2400)
+                below(4000)
             };
             damaged[at] = b"0129\"[],{}x\x00\xff"[below(13)];
         }
@@ -368,6 +396,12 @@ fn damaged_files_never_panic() {
         std::fs::write(&path, &damaged).expect("it can be written");
         if let Ok(read) = Motion::load(&path) {
             assert!(read.qpos.len() == read.bodies.len());
+            if let Some(source) = &read.source {
+                let tracks = source.rotations.values().map(Vec::len);
+                let tracks = tracks.chain(source.translations.values().map(Vec::len));
+                assert!(tracks.into_iter().all(|length| length == read.qpos.len()));
+                assert_eq!(source.first.len(), source.joints.len());
+            }
         }
     }
 }

@@ -15,7 +15,9 @@ const STILL: f64 = 1e-5;
 pub(super) fn source_rig(input: &Input, skeleton: &Skeleton) -> SourceRig {
     let Input { clip, own, map, .. } = input;
     let slots = map.matches.iter().map(|(slot, found)| (*slot, found.joint));
-    let followed = slots.clone().filter(|(slot, _)| skeleton.slots.contains_key(slot));
+    let followed = slots
+        .clone()
+        .filter(|(slot, _)| skeleton.slots.contains_key(slot));
     let followed: BTreeSet<usize> = followed.map(|(_, joint)| joint).collect();
     let mut source = SourceRig {
         joints: clip.joints.clone(),
