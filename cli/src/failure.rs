@@ -29,7 +29,7 @@ fn flag(parameter: Parameter) -> Option<&'static str> {
 }
 
 /// Why a command ended early.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub enum Failure {
     /// It failed, and nobody has been told yet.
     Failed(Box<Explanation>),

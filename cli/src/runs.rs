@@ -1,4 +1,4 @@
-//! Training runs as the verbs use them.
+//! Training runs: opening, evaluating and recording them, for the verbs that do.
 
 use crate::args::positive;
 use crate::failure::{Failure, Outcome};
@@ -10,13 +10,13 @@ use mimic::run::{CaseEvaluation, Controller, Run};
 use mimic::task::{Episode, EpisodeStart, Perturbations};
 use std::path::{Path, PathBuf};
 
-/// Opens the run that `wanted` means; left out, the newest.
+/// Opens the run that `wanted` means. Left out, the newest run.
 pub fn open(wanted: Option<&Path>) -> Outcome<Run> {
     let folder = locate::run(wanted)?;
     Ok(Run::open(folder)?)
 }
 
-/// A folder for a new run, named after what it learns: the first of NAME, NAME-2, … that isn't taken.
+/// A folder for a new run, named after what it learns: the first of NAME, NAME-2, … that does not exist.
 pub fn free_folder(name: &str) -> PathBuf {
     let runs = Path::new(locate::RUNS);
     let numbered = (2..).map(|number| runs.join(format!("{name}-{number}")));
@@ -41,8 +41,8 @@ pub fn evaluate(run: &Run, options: &Options, printer: &Printer) -> Outcome<Vec<
     Ok(run.evaluate(options)?)
 }
 
-/// What disturbs a run's agent when it is measured: what disturbed its training, or else, if it is `asked` for, what usually
-/// does. The reference follows, however the agent was trained, so that all are measured alike.
+/// The disturbances under which a run is evaluated: those of its training, or if it had none but they are `asked` for, the
+/// usual ones. The reference follows the agent whether or not it did so in training, so that all runs are measured alike.
 pub fn perturbations(run: &Run, asked: bool) -> Option<Perturbations> {
     let trained = *run.plan().task.perturbations();
     (asked || trained.is_on()).then(|| Perturbations {
@@ -51,17 +51,16 @@ pub fn perturbations(run: &Run, asked: bool) -> Option<Perturbations> {
     })
 }
 
-/// The agent's episode from this start.
+/// Records the agent's episode from this start, `seconds` long.
 pub fn record(run: &Run, start: EpisodeStart, seconds: f64) -> Outcome<Recording> {
     let controller = run.controller()?;
     let count = run.motions().len();
     let Some(motion) = run.motions().get(start.case) else {
         let motions = if count == 1 { "motion" } else { "motions" };
-        return Err(Failure::user(format!(
-            "`{}` learned {count} {motions}, there is no number {}",
-            run.dir().display(),
-            start.case + 1
-        )));
+        let number = start.case + 1;
+        let cause = format!("this run learned {count} {motions}, so there is no number {number}");
+        return Err(Failure::input(run.dir(), cause)
+            .with_remedy(format!("choose a number from 1 to {count}")));
     };
     let episodes = perform(&controller, &[start], seconds)?;
     shown(&motion.name, &controller, &episodes[0])
@@ -78,7 +77,8 @@ fn shown(name: &str, controller: &Controller, episode: &Episode) -> Outcome<Reco
     Ok(Recording::of_episode(name, episode, task))
 }
 
-/// The agent's performance of several of its motions, one after the other, each for `seconds` or to its end.
+/// Records the agent while it performs several of its motions one after another. A looping motion lasts `seconds`, others
+/// play to their end.
 pub fn record_sequence(
     run: &Run,
     names: &[String],
@@ -106,7 +106,7 @@ pub fn record_sequence(
     shown(&names.join("-"), &controller, &episode)
 }
 
-/// The motion of a run that a name means: its whole name, or a part of it, that no other has.
+/// The number of the motion that a name means: its whole name, or a part that no other motion's name has.
 fn number_of(run: &Run, name: &str) -> Outcome<usize> {
     let motions = run.motions();
     let exact = motions.iter().any(|m| m.name == name);
@@ -120,27 +120,25 @@ fn number_of(run: &Run, name: &str) -> Outcome<usize> {
         (found, _) => {
             let known: Vec<&str> = motions.iter().map(|m| m.name.as_str()).collect();
             let what = match found {
-                Some(_) => "several motions for",
+                Some(_) => "several motions",
                 None => "no motion",
             };
-            Err(Failure::user(format!(
-                "`{}` learned {what} `{name}`; its motions are {}",
-                run.dir().display(),
-                known.join(", ")
-            )))
+            let cause = format!("this run learned {what} whose name contains `{name}`");
+            Err(Failure::input(run.dir(), cause)
+                .with_remedy(format!("choose one of {}", known.join(", "))))
         }
     }
 }
 
-/// A positive number of `unit`, up to `most`: clocks and memory end somewhere.
+/// A positive number of `unit`, up to `most`, because clocks and memory are finite.
 pub fn at_most(text: &str, most: f64, unit: &str) -> Result<f64, String> {
     match positive(text)? {
         number if number <= most => Ok(number),
-        _ => Err(format!("at most {most} {unit} are possible")),
+        _ => Err(format!("must be at most {most} {unit}")),
     }
 }
 
-/// Uses this many threads for everything from now on; the results are the same at any number.
+/// Uses this many threads for everything from now on. Results do not depend on it.
 pub fn use_threads(threads: Option<usize>) -> Outcome<usize> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0));
     pool.build_global()

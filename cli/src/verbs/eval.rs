@@ -1,4 +1,4 @@
-//! `mimic eval`: how well an agent performs what it learned.
+//! `mimic eval`: measures how well an agent performs what it learned.
 
 use crate::args::at_least_one;
 use crate::failure::{Failure, Outcome};
@@ -13,40 +13,40 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic eval                        the newest run
-  mimic eval runs/kick --episodes 64 --out kick-64.json
-  mimic eval kick --perturb         how it takes shoves, more or less weight and friction
-  mimic eval kick --json            the same fields as in runs/kick/eval.json
+  mimic eval                                 evaluate the newest run
+  mimic eval kick --episodes 64 --out kick-64.json
+  mimic eval kick --perturb                  disturb the agent by shoves, too
+  mimic eval kick --json                     print the fields of eval.json
 
-A run's own eval.json is written with the default episodes and seconds alone, so that runs can be compared by it.";
+The run's own eval.json is written only with the default number of episodes and seconds, so that \
+runs can be compared by it.";
 
-/// Phases that a table's line has room for.
+/// Most phases that a line of the table lists.
 const MOST_PHASES: usize = 8;
 
-/// Every frame of every episode is held in memory until all are measured.
+/// Longest episode, seconds: every frame of every episode is held in memory until all are measured.
 const MOST_SECONDS: f64 = 3600.0;
 
 /// Measure how well an agent performs: survival, tracking errors, contacts, momentum
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Run folder, or its name in runs/ [default: the newest]
+    /// Run folder, or its name in runs/ [default: the newest run]
     run: Option<PathBuf>,
-    /// Episodes, started at phases spread evenly over the motion
+    /// Number of episodes; they start at phases spread evenly over the motion
     #[arg(long, value_name = "N", default_value_t = Options::default().episodes, value_parser = at_least_one)]
     episodes: usize,
-    /// Length of an episode of a looping motion; one that ends is played to its end
+    /// Length of an episode in seconds, for looping motions; others play to their end
     #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds)]
     seconds: f64,
-    /// Play every phase a second time, disturbed: shoves, weight and friction as in the run's training, or else the
-    /// usual ones (docs/presets.md); from the first shove on the reference follows the agent [default: for runs that were
-    /// trained so]
+    /// Repeat every episode with shoves and with changed weight and friction, as in the run's training or else the usual ones;
+    /// the reference then follows the agent [default: for runs that were trained with disturbances]
     #[arg(long)]
     perturb: bool,
-    /// Threads [default: all]; the result is the same at any number
+    /// Number of threads; the result does not depend on it [default: one per core]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     threads: Option<usize>,
-    /// Write the result to this file, as JSON [default: the run's eval.json, with default episodes and seconds]
+    /// Write the result to FILE, as JSON [default: the run's eval.json, if episodes and seconds have their defaults]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -77,12 +77,15 @@ impl Args {
                 Ok(())
             }
         };
-        printer.result(&CaseEvaluation::json(&results), || text(&results))?;
-        kept
+        let report = CaseEvaluation::json(&results);
+        match kept {
+            Ok(()) => printer.result(&report, || text(&results)),
+            Err(failure) => printer.partial_result(report, || text(&results), failure),
+        }
     }
 }
 
-/// Where `--out` puts the result: never over what the run is made of, nor over its own evaluation.
+/// Where `--out` puts the result: never in place of a file that a run is made of, such as its own evaluation.
 fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
     let path = output::result_path(Some(out), "eval", "json");
     let folder = path
@@ -96,10 +99,9 @@ fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
     };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if inside && !name.starts_with("eval-") {
-        return Err(Failure::input(
-            &path,
-            format!("belongs to {whose} run, name a file elsewhere, or one like `eval-long.json`"),
-        ));
+        let cause = format!("this belongs to {whose} run");
+        return Err(Failure::input(&path, cause)
+            .with_remedy("name a file elsewhere, or one such as `eval-long.json`"));
     }
     output::spare_others(&path, "json")?;
     Ok(path)
@@ -112,7 +114,8 @@ fn write(path: &Path, results: &[CaseEvaluation]) -> Outcome {
     output::write_whole(path, CaseEvaluation::text(results).as_bytes())
 }
 
-/// A run that can't be written, such as somebody else's, can still be measured.
+/// Keeps an evaluation with the default options in the run. A run that cannot be written, such as that of another user, can
+/// still be evaluated.
 fn keep(run: &Run, options: &Options, results: &[CaseEvaluation], printer: &Printer) {
     let usual = Options {
         perturbations: options.perturbations,
@@ -120,15 +123,15 @@ fn keep(run: &Run, options: &Options, results: &[CaseEvaluation], printer: &Prin
     };
     if *options != usual {
         printer.note(format!(
-            "`{}` keeps its evaluation with the default options; `--out FILE` writes this one",
+            "the eval.json of `{}` stays as it is, because the options differ from the default; `--out FILE` writes a file",
             run.dir().display()
         ));
     } else if let Err(error) = run.keep_evaluation(results) {
-        printer.warn(format!("{error}; `--out FILE` writes it elsewhere"));
+        printer.warn(format!("{error}, or write it elsewhere with `--out FILE`"));
     }
 }
 
-/// Start phases from which the agent fails, the first few of them.
+/// The first few of the phases from which the agent fails.
 fn failed(failures: &[FailedEpisode], how: &str) -> Option<(String, String)> {
     let starts = failures.iter().take(MOST_PHASES);
     let mut phases: Vec<String> = starts.map(|f| format!("{:.2}", f.start)).collect();

@@ -1,8 +1,9 @@
-//! `mimic train`: a policy learns to perform a motion under physics.
+//! `mimic train`: trains a policy to perform a motion under physics.
 
 mod finish;
 mod preset;
 mod progress;
+mod resume;
 mod setting;
 mod stop;
 
@@ -13,81 +14,87 @@ use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use mimic::run::{Run, RunError, Session, files};
+use mimic::run::{Run, Session, files};
 use mimic::task::{TASKS, TaskError};
 use preset::Preset;
 use progress::Progress;
+use resume::{farewell, unwritten};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stop::Stop;
 
 const EXAMPLES: &str = "\
 Examples:
-  mimic train kick.fbx                              imports, retargets, and learns it: runs/kick
+  mimic train kick.fbx                       import, retarget, train: runs/kick
   mimic train kick.motion --minutes 10 --seed 7 --out runs/kick-seed7
-  mimic train walk.motion run.motion                one policy for both
-  mimic train --resume kick                         goes on where it stopped, to the same bits
-  mimic train kick.fbx --json > curve.jsonl         a line per iteration
+  mimic train walk.motion run.motion         train one policy for both motions
+  mimic train --resume kick                  continue a stopped run, bit for bit
+  mimic train kick.fbx --json > curve.jsonl  print a line per iteration
   mimic train kick.fbx --preset booth2020 --samples 20M
   mimic train kick.fbx --set task.terminations.distance=0.4 --set ppo.gamma=0.97
 
-Presets (docs/presets.md has every value):
-  default     ours: rotations added to the reference's, learned in minutes
-  deepmimic   the reward and rates of the program of Peng et al. 2018, learned as in ours
-  deepmimic2018
-              their paper, with its learner too: absolute targets, a large network; for 60M samples
-  booth2020   Booth & Ivanov 2020, on the character `marathon`: 258 observations, 21 targets, angular momentum, starts
-              at the first frame alone, ends at a reward threshold; for 128M samples
-`--set` changes any single value of them, by its path in the run's config.json under `plan`.
+Presets (docs/settings.md lists all their values):
+  default        ours: actions are rotations added to those of the reference;
+                 a clip takes minutes
+  deepmimic      reward and rates of the code of Peng et al. 2018, our learner
+  deepmimic2018  their paper, with its learner: absolute target rotations and a
+                 large network; made for 60M samples
+  booth2020      Booth & Ivanov 2020, on the character `marathon`: 258 numbers
+                 observed, 21 targets, angular momentum in observation and reward;
+                 episodes start at the first frame and end when the reward falls
+                 below a threshold; made for 128M samples
 
-The run folder holds config.json, metrics.jsonl, checkpoint and policy, at the end also eval.json and replay.rrd.
-A finished run is never overwritten: the next run of the same clip is runs/kick-2. Ctrl-C ends the round that is
-under way, saves, and stops; a second Ctrl-C stops at once, at the last checkpoint.";
+`--set` changes one setting of the preset, by its path under `plan` in a run's config.json.
 
-/// Two years: longer than anybody trains, and within what clocks can count.
+A run folder holds config.json, metrics.jsonl, the checkpoint and the policy, and in the end also \
+eval.json and replay.rrd. No run is ever overwritten: the next one of the same clip is runs/kick-2. \
+Ctrl-C finishes the current round, saves and stops. A second Ctrl-C stops at once and keeps the last \
+checkpoint.";
+
+/// Longest training, minutes: two years, which is longer than anybody trains and within what clocks can count.
 const MOST_MINUTES: f64 = 1e6;
 
 /// Train a policy that performs a motion under physics
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Motions, clips or animation files [default: the newest motion]
+    /// Motions, clips or animation files; one policy learns all of them [default: the newest motion]
     #[arg(value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// What is learned
+    /// What the policy learns
     #[arg(long, value_name = "TASK", value_parser = tasks(), default_value = TASKS[0].0)]
     task: String,
-    /// Settings to start from: `default`, `deepmimic`, `deepmimic2018`, `booth2020`, those of a run, or a JSON file with a plan as in a
-    /// run's config.json
+    /// Settings to start from: `default`, `deepmimic`, `deepmimic2018`, `booth2020`, those of a run, or a JSON file with a
+    /// plan as in a run's config.json
     #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
     preset: String,
-    /// Change one value of the preset, e.g. `task.terminations.distance=0.4`; can be given several times
+    /// Change one setting of the preset, e.g. `ppo.gamma=0.97`; can be repeated
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<String>,
-    /// Disturb training by shoves, more or less weight and friction, as the preset does or else usually (docs/presets.md);
-    /// `task.perturbations` has their ranges
+    /// Disturb training by shoves and by changed weight and friction; their ranges are those of the preset, or if it has none
+    /// the usual ones (`task.perturbations` in docs/settings.md)
     #[arg(long)]
     perturb: bool,
-    /// Samples to learn from, e.g. 5M or 800k [default: as the preset says]
+    /// Number of samples to learn from, e.g. 5M or 800k [default: that of the preset]
     #[arg(long, value_name = "N", value_parser = count)]
     samples: Option<u64>,
-    /// Stop after this many minutes, if the samples last longer
+    /// Stop after this many minutes, even if samples are left
     #[arg(long, value_name = "MIN", value_parser = minutes)]
     minutes: Option<f64>,
-    /// Seed of all random numbers; the same seed gives the same bits [default: as the preset says]
+    /// Random seed; the same seed gives the same result, bit for bit [default: that of the preset]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Threads [default: all]; the result is the same at any number
+    /// Number of threads; the result does not depend on it [default: one per core]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     threads: Option<usize>,
-    /// Go on with a run that was stopped
+    /// Continue a run that was stopped
     #[arg(
         long,
         value_name = "RUN",
         conflicts_with_all = ["inputs", "out", "samples", "seed", "preset", "set", "perturb", "task", "ImportArgs", "RetargetArgs"]
     )]
     resume: Option<PathBuf>,
-    /// Folder of the run [default: runs/CLIP, numbered when that exists]
+    /// Folder of the run [default: runs/CLIP, or runs/CLIP-2 and so on if that exists]
     #[arg(long, short, value_name = "RUN")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -96,13 +103,13 @@ pub struct Args {
     retarget: RetargetArgs,
 }
 
-/// Names of the tasks, with what they are.
+/// The names of the tasks and what they are.
 fn tasks() -> PossibleValuesParser {
     let value = |(name, about): (&'static str, &'static str)| PossibleValue::new(name).help(about);
     PossibleValuesParser::new(TASKS.map(value))
 }
 
-/// How a training session came to its end.
+/// Why a training session ended.
 enum End {
     Done,
     OutOfTime,
@@ -138,13 +145,13 @@ impl Args {
         }
     }
 
-    /// Everything a run is made of is read and checked before its folder appears.
+    /// Makes the run. Everything that it needs is read and checked before its folder appears.
     fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
         let preset = self.preset()?;
         let task = preset.plan.task.name();
         if self.task != task {
             return Err(Failure::user(format!(
-                "`--task {}` doesn't fit the preset, which is for the task `{task}`",
+                "`--task {}` does not fit the preset, which is for the task `{task}`",
                 self.task
             ))
             .with_remedy("choose another preset"));
@@ -170,11 +177,12 @@ impl Args {
             }
             motions.push(motion);
         }
-        let skeleton = skeleton.ok_or_else(|| Failure::user("no motion to learn"))?;
+        let skeleton = skeleton.ok_or_else(|| Failure::user("there is no motion to learn"))?;
         Run::create(folder, preset.plan.clone(), skeleton, motions).map_err(|e| preset.failure(e))
     }
 
-    /// A finished motion has its character; a clip takes the preset's, unless another is asked for.
+    /// What the inputs are and how they become motions. A motion has its character already; a clip gets that of the preset
+    /// unless `--skeleton` names another.
     fn preparations(&self, library: &Path, skeleton: Option<&str>) -> Outcome<Vec<Preparation>> {
         let find = |wanted: Option<&Path>| {
             locate::file_or_newest(wanted, library, &locate::ANIMATIONS, "motion")
@@ -197,12 +205,13 @@ impl Args {
         Ok(files.into_iter().map(prepare).collect())
     }
 
+    /// The folder of the new run: that of `--out`, or a free one named after the inputs.
     fn folder(&self, preparations: &[Preparation], printer: &Printer) -> Outcome<PathBuf> {
         if let Some(out) = &self.out {
             if locate::is_run(out) {
                 return Err(
-                    Failure::input(out, "already holds a run").with_remedy(format!(
-                        "choose another folder with `--out`, or resume that run with `--resume {}`",
+                    Failure::input(out, "this folder holds a run already").with_remedy(format!(
+                        "choose another folder with `--out`, or continue that run with `--resume {}`",
                         out.display()
                     )),
                 );
@@ -221,13 +230,14 @@ impl Args {
             .is_some_and(|taken| taken != name.as_str())
         {
             printer.note(format!(
-                "a run `{name}` is there already, this one becomes `{}`",
+                "a run `{name}` exists already, so this one is `{}`",
                 folder.display()
             ));
         }
         Ok(folder)
     }
 
+    /// The settings of the preset, with the changes of the command line.
     fn preset(&self) -> Outcome<Preset> {
         let mut preset = Preset::load(&self.preset)?;
         if self.perturb {
@@ -237,7 +247,9 @@ impl Args {
         preset.change(&self.set)?;
         let plan = &mut preset.plan;
         if plan.samples == 0 {
-            return Err(Failure::user("samples is 0").with_remedy("set it to 1 or more"));
+            return Err(
+                Failure::user("the number of samples is 0").with_remedy("set it to 1 or more")
+            );
         }
         plan.samples = self.samples.unwrap_or(plan.samples);
         plan.seed = self.seed.unwrap_or(plan.seed);
@@ -245,39 +257,8 @@ impl Args {
     }
 }
 
-/// What was typed to run us; from a fresh clone that isn't `mimic`.
-fn program() -> String {
-    let program = std::env::args_os().next();
-    program.map_or_else(
-        || "mimic".into(),
-        |program| program.to_string_lossy().into_owned(),
-    )
-}
-
-/// The last word of a run that somebody stopped.
-fn farewell(run: &Run) -> String {
-    format!(
-        "stopped; go on with `{} train --resume {}`",
-        program(),
-        run.dir().display()
-    )
-}
-
-/// A run that can't be written any more, because the disk is full for one: what was saved last is whole.
-fn unwritten(run: &Run, error: RunError) -> Failure {
-    let resume = format!(
-        "check its permissions and the free space there, then go on with `{} train --resume {}`",
-        program(),
-        run.dir().display()
-    );
-    match error.is_write() {
-        true => Failure::from(error).with_remedy(resume),
-        false => Failure::from(error),
-    }
-}
-
-/// Learns until the samples or the time are used up, or somebody wants to stop. Checkpoints stand between rounds,
-/// where a run resumes to the same bits.
+/// Trains until the samples or the time are used up, or until Ctrl-C. It saves between rounds only: there a run can be
+/// continued bit for bit.
 fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Outcome<End> {
     let begun = Instant::now();
     let progress = Progress::new(session, printer);
@@ -293,7 +274,7 @@ fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Ou
         let iteration = iteration.map_err(|e| unwritten(session.run(), e))?;
         progress.show(&iteration, printer)?;
         if stop.is_wanted() {
-            progress.say("ending this round");
+            progress.say("finishing this round");
         }
         if !session.can_be_saved() {
             continue;
@@ -324,7 +305,7 @@ fn minutes(text: &str) -> Result<f64, String> {
 fn count(text: &str) -> Result<u64, String> {
     let (number, unit) = match text.trim_end_matches(['k', 'K', 'm', 'M']) {
         number if number.len() + 1 < text.len() => {
-            return Err(format!("`{text}` is no number of samples"));
+            return Err(format!("`{text}` is not a number of samples"));
         }
         number => (number, &text[number.len()..]),
     };
@@ -340,7 +321,7 @@ fn count(text: &str) -> Result<u64, String> {
     if (1.0..=1e15).contains(&value) {
         Ok(value as u64)
     } else {
-        Err("at least 1 is needed".into())
+        Err("must be at least 1".into())
     }
 }
 

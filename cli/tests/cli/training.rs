@@ -115,7 +115,7 @@ fn a_run_is_trained_measured_and_recorded() {
     }
 
     let said = bench.complaint(&["train", "sway.txt", "--out", "runs/sway"], 2);
-    assert!(said.contains("holds a run already"), "{said}");
+    assert!(said.contains("this folder holds a run already"), "{said}");
     bench.mimic(&line).assert().success();
     assert!(
         bench.path("runs/sway-2/eval.json").is_file(),
@@ -235,7 +235,7 @@ fn a_first_run_is_called_the_first() {
     for (run, is_second) in [("runs/my-sway", false), ("runs/my-sway-2", true)] {
         let output = bench.mimic(&line).assert().success();
         let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
-        assert_eq!(said.contains("there already"), is_second, "{said}");
+        assert_eq!(said.contains("exists already"), is_second, "{said}");
         assert!(bench.path(run).exists());
     }
 }
@@ -356,7 +356,7 @@ fn a_wrong_change_names_what_is_near() {
     assert!(said("ppo.gamma=3").contains("gamma is 3"));
     let wrong = said("task.rewards.kernels=deepmimic");
     assert!(wrong.contains("`position`"), "{wrong}");
-    assert!(said("task.rewards.kernels=mine").contains("now it is \"tracking\""));
+    assert!(said("task.rewards.kernels=mine").contains("the present one, \"tracking\""));
     assert!(!bench.path("runs").exists());
 }
 

@@ -1,6 +1,6 @@
-//! What follows the learning: how well it went, and how to look at it.
+//! The end of training: evaluation, recording, and how to watch the result.
 
-use super::{program, unwritten};
+use super::resume::{program, unwritten};
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::recording;
@@ -12,10 +12,10 @@ use mimic::run::{Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
 use std::path::{Path, PathBuf};
 
-/// Seconds of a looping motion in the recording of a finished run.
+/// Length of the recording of a looping motion, seconds.
 const REPLAY_S: f64 = 10.0;
 
-/// Measures and records what was learned.
+/// Evaluates and records what was learned.
 pub fn finish(session: &Session, printer: &Printer) -> Outcome {
     let run = session.run();
     let options = Options {
@@ -36,7 +36,7 @@ pub fn finish(session: &Session, printer: &Printer) -> Outcome {
     printer.text(&format!("{folder}\n{}{look}", eval::text(&results)))
 }
 
-/// A run that has learned all it will: makes up for what a killed session left out.
+/// For a run that has used up its samples: does what a session that was killed left out.
 pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
     let run = session.run();
     let folder = run.dir().display();
@@ -45,21 +45,21 @@ pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
     if is_there(files::EVALUATION) && recorded {
         let (samples, mimic) = (session.trainer().samples(), program());
         return Err(Failure::user(format!(
-            "`{folder}` is finished: it has learned from all its {samples} samples"
+            "the run `{folder}` is finished: it has learned from all its {samples} samples"
         ))
         .with_remedy(format!(
-            "measure it with `{mimic} eval {folder}`, or watch it with `{mimic} replay {folder} --rerun`"
+            "evaluate it with `{mimic} eval {folder}`, or watch it with `{mimic} replay {folder} --rerun`"
         )));
     }
     printer.note(format!(
-        "`{folder}` has learned from all its samples; only its evaluation or its recording is missing"
+        "the run `{folder}` has used up its samples; only its evaluation or its recording is missing"
     ));
-    // The checkpoint is written first, so the policy may be that of the round before.
+    // A killed session may have written the last checkpoint, but not the policy that belongs to it.
     session.save().map_err(|e| unwritten(run, e))?;
     finish(session, printer)
 }
 
-/// The recording's file; `None` where the agent has nothing to show, or this build can't write recordings.
+/// Writes the recording and returns its file; `None` if the agent fails at once, or this build cannot write recordings.
 fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
     if !recording::AVAILABLE {
         return Ok(None);
@@ -84,10 +84,7 @@ fn how_to_look(folder: &Path, recording: &Path) -> String {
         "recording: {recording}\n  watch it          rerun {recording}\n  or from the run   {mimic} replay {folder} --rerun\n"
     );
     if Viewer::find().is_none() {
-        text += &format!(
-            "  there is no rerun on this machine yet: {}\n",
-            viewer::install()
-        );
+        text += &format!("  rerun is not installed yet: {}\n", viewer::install());
     }
     text
 }

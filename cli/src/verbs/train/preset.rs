@@ -8,22 +8,24 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// The settings, and where they come from.
 pub struct Preset {
+    /// The settings.
     pub plan: Plan,
-    /// The character that it is meant for, if any.
+    /// The character that the settings are made for, if any.
     pub skeleton: Option<&'static str>,
-    /// `None` for what is built in.
+    /// The file of the settings; `None` for those that are built in.
     file: Option<PathBuf>,
 }
 
-/// What matters here of a run's `config.json`.
+/// The part of a run's `config.json` that is read here.
 #[derive(Deserialize)]
 struct Config {
     plan: Plan,
 }
 
 impl Preset {
-    /// A preset's name, a JSON file with a plan, a run's `config.json`, or a run.
+    /// `name` is that of a preset, or the path of a JSON file with a plan, of a run's `config.json`, or of a run.
     pub fn load(name: &str) -> Outcome<Self> {
         if let Some(preset) = preset(name) {
             return Ok(Self {
@@ -33,11 +35,14 @@ impl Preset {
             });
         }
         let file = file(Path::new(name))?;
-        let text = std::fs::read_to_string(&file).map_err(|e| Failure::input(&file, e))?;
-        let plan =
-            parse(&text).map_err(|e| Failure::input(&file, format!("not a training plan: {e}")))?;
+        let text = std::fs::read_to_string(&file).map_err(|e| Failure::unreadable(&file, &e))?;
+        let plan = parse(&text).map_err(|e| {
+            Failure::input(&file, format!("this is not a training plan: {e}"))
+                .with_remedy("compare it with `plan` in the config.json of a run")
+        })?;
         if plan.samples == 0 {
-            return Err(Failure::input(&file, "samples is 0").with_remedy("set it to 1 or more"));
+            return Err(Failure::input(&file, "the number of samples is 0")
+                .with_remedy("set `samples` to 1 or more"));
         }
         Ok(Self {
             plan,
@@ -46,22 +51,21 @@ impl Preset {
         })
     }
 
-    /// Changes single values: `task.terminations.distance=0.4`.
+    /// Changes single settings, such as `task.terminations.distance=0.4`.
     pub fn change(&mut self, changes: &[String]) -> Outcome {
         for change in changes {
-            self.plan = setting::change(&self.plan, change)
-                .map_err(|e| Failure::user(format!("`--set {change}`: {e}")))?;
+            self.plan = setting::change(&self.plan, change)?;
         }
         Ok(())
     }
 
-    /// Why no run can be made with these settings.
+    /// The failure of a run that cannot be made with these settings.
     pub fn failure(&self, error: RunError) -> Failure {
         failure(self.file.as_deref(), error)
     }
 }
 
-/// Why a run can't be made or go on; a wrong setting is that of the `file` it stands in.
+/// The failure of a run that cannot be made or continued. A wrong setting is blamed on the `file` that holds it.
 pub fn failure(file: Option<&Path>, error: RunError) -> Failure {
     match file {
         Some(file) if error.is_setting() => Failure::in_file(file, error),
@@ -75,16 +79,15 @@ fn file(wanted: &Path) -> Outcome<PathBuf> {
     }
     let run = locate::existing_run(wanted).ok_or_else(|| {
         let names = PRESETS.map(|preset| format!("`{}`", preset.name));
-        Failure::user(format!(
-            "no preset `{}`: give {}, a JSON file with a plan, or a run",
-            wanted.display(),
+        Failure::user(format!("there is no preset `{}`", wanted.display())).with_remedy(format!(
+            "choose {}, a JSON file with a plan, or a run",
             names.join(", ")
         ))
     })?;
     Ok(run.join(files::CONFIG))
 }
 
-/// Reads from the text in both cases, so that errors say line and column.
+/// Reads a plan, alone or in a run's configuration. Both are read from the text, so that errors say line and column.
 fn parse(text: &str) -> serde_json::Result<Plan> {
     let value: Value = serde_json::from_str(text)?;
     if value.get("plan").is_some() {

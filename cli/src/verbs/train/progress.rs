@@ -6,12 +6,14 @@ use indicatif::ProgressBar;
 use mimic::run::{Iteration, Session};
 use serde_json::json;
 
+/// A progress bar, or lines where nobody sees a bar.
 pub struct Progress {
     bar: ProgressBar,
     folder: String,
 }
 
 impl Progress {
+    /// Starts where the session does.
     pub fn new(session: &Session, printer: &Printer) -> Self {
         let bar = printer.progress(
             session.trainer().settings().samples,
@@ -25,7 +27,7 @@ impl Progress {
         }
     }
 
-    /// A printed line also says which run it belongs to; the log doesn't, for a run can be moved.
+    /// Shows an iteration. The line that is printed names the run; the log does not, because a run can be moved.
     pub fn show(&self, iteration: &Iteration, printer: &Printer) -> Outcome {
         let metrics = &iteration.metrics;
         let message = format!(
@@ -46,10 +48,12 @@ impl Progress {
         Ok(())
     }
 
+    /// Says what is going on.
     pub fn say(&self, text: &'static str) {
         self.bar.set_message(text);
     }
 
+    /// The bar itself.
     pub fn bar(&self) -> ProgressBar {
         self.bar.clone()
     }
@@ -61,7 +65,7 @@ impl Drop for Progress {
     }
 }
 
-/// A figure of the episodes that ended, if any did.
+/// A figure of the episodes that ended; a dash if none did.
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
 }

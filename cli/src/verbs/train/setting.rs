@@ -1,39 +1,49 @@
-//! Single values of a plan, by their path: `ppo.gamma=0.99`.
+//! Single settings of a plan, by their path: `ppo.gamma=0.99`.
 
+use crate::failure::{Failure, Outcome};
 use mimic::run::Plan;
 use serde_json::Value;
 use strsim::levenshtein;
 
-/// How many names an error lists.
+/// How many similar names an error lists.
 const SHOWN: usize = 3;
 
-/// The plan with one value changed. `change` is `PATH=VALUE`, the value as in JSON; a plain word needs no quotes.
-///
-/// # Errors
-/// What is wrong about it, in words.
-pub fn change(plan: &Plan, change: &str) -> Result<Plan, String> {
-    let (path, text) = change
-        .split_once('=')
-        .ok_or("give a path and a value, e.g. `ppo.gamma=0.99`")?;
+/// The plan with one setting changed. `change` is `PATH=VALUE`, the value as in JSON; a plain word needs no quotes.
+pub fn change(plan: &Plan, change: &str) -> Outcome<Plan> {
+    let wrong = |cause: String| Failure::user(cause).with_place(format!("`--set {change}`"));
+    let (path, text) = change.split_once('=').ok_or_else(|| {
+        wrong("there is no value".into())
+            .with_remedy("give a path and a value, e.g. `ppo.gamma=0.99`")
+    })?;
     let (path, text) = (path.trim(), text.trim());
-    // By way of text, where single precision has its shortest digits.
-    let written = serde_json::to_string(plan).map_err(|e| e.to_string())?;
-    let mut values: Value = serde_json::from_str(&written).map_err(|e| e.to_string())?;
+    // Through text, in which an f32 has its shortest digits: 0.95, not 0.949999988.
+    let written = serde_json::to_string(plan);
+    let values = written.and_then(|written| serde_json::from_str(&written));
+    let mut values: Value = values.map_err(|e| wrong(e.to_string()))?;
     let known = paths(&values);
     let pointer = format!("/{}", path.trim_start_matches('/').replace('.', "/"));
     let place = values
         .pointer_mut(&pointer)
         .filter(|_| !path.is_empty())
-        .ok_or_else(|| unknown(path, &known))?;
+        .ok_or_else(|| {
+            wrong(format!("there is no setting `{path}`"))
+                .with_remedy(format!("use one such as {}", similar(path, &known)))
+        })?;
     let old = place.to_string();
     *place = match serde_json::from_str(text) {
-        Err(e) if text.starts_with(['{', '[']) => return Err(format!("`{text}` is no JSON: {e}")),
+        Err(e) if text.starts_with(['{', '[']) => {
+            return Err(wrong(format!("the value is not JSON: {e}"))
+                .with_remedy(format!("give a value such as the present one, {old}")));
+        }
         value => value.unwrap_or_else(|_| Value::from(text)),
     };
-    serde_json::from_value(values).map_err(|e| format!("{e}; now it is {old}"))
+    serde_json::from_value(values).map_err(|e| {
+        wrong(e.to_string()).with_remedy(format!("give a value such as the present one, {old}"))
+    })
 }
 
-fn unknown(path: &str, known: &[String]) -> String {
+/// The names most similar to `path`, in a sentence.
+fn similar(path: &str, known: &[String]) -> String {
     let mut near: Vec<&String> = known.iter().collect();
     near.sort_by_key(|name| distance(path, name));
     let near: Vec<String> = near
@@ -41,13 +51,10 @@ fn unknown(path: &str, known: &[String]) -> String {
         .take(SHOWN)
         .map(|name| format!("`{name}`"))
         .collect();
-    format!(
-        "there is no setting `{path}`; near it are {}",
-        near.join(", ")
-    )
+    near.join(", ")
 }
 
-/// Every path in a plan, those of whole groups as well.
+/// The paths of all settings in a plan, and those of groups of settings.
 fn paths(value: &Value) -> Vec<String> {
     let Value::Object(fields) = value else {
         return Vec::new();
@@ -60,7 +67,7 @@ fn paths(value: &Value) -> Vec<String> {
     found
 }
 
-/// How far a path is from one that exists; a path's last name alone is as near as the whole.
+/// Edits from what was typed to a path that exists. The last names alone count as well, for whoever leaves out the group.
 fn distance(typed: &str, name: &str) -> usize {
     let last = |path: &str| path.rsplit(['.', '/']).next().unwrap_or(path).to_owned();
     levenshtein(typed, name).min(levenshtein(&last(typed), &last(name)))
@@ -105,13 +112,16 @@ mod tests {
 
     #[test]
     fn a_wrong_change_is_explained() {
-        let said = |text| change(&Plan::default(), text).expect_err("it is wrong");
+        let said = |text| {
+            let failure = change(&Plan::default(), text).expect_err("it is wrong");
+            failure.message().unwrap_or_default()
+        };
         assert!(said("task.termination.distance=1").contains("`task.terminations.distance`"));
         assert!(said("gama=1").contains("`ppo.gamma`"));
-        assert!(said("ppo.gamma=high").ends_with("now it is 0.95"));
+        assert!(said("ppo.gamma=high").ends_with("the present one, 0.95"));
         assert!(said("task.actions.kind=absolute").contains("reach"));
         assert!(said("gamma").contains("ppo.gamma=0.99"));
-        assert!(said(r#"task.rewards={"pose": 1"#).contains("no JSON: EOF"));
+        assert!(said(r#"task.rewards={"pose": 1"#).contains("not JSON: EOF"));
         assert!(said("=3").contains("no setting"));
     }
 }

@@ -1,16 +1,18 @@
-//! Ctrl-C asks to stop; a second one insists, and so does the first once there is no more to save.
+//! Ctrl-C: the first asks training to stop, the second ends the program at once. Once there is nothing left to save, the
+//! first ends it too.
 
 use crate::failure::{Failure, Outcome};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// As shells report a program that was stopped by Ctrl-C.
+/// The exit code that shells report for a program ended by Ctrl-C: 128 and the number of SIGINT.
 const STOPPED: i32 = 130;
 
+/// Counts how often Ctrl-C was pressed.
 pub struct Stop(Arc<AtomicUsize>);
 
 impl Stop {
-    /// `farewell` is said before the program ends by force.
+    /// Begins to count. `farewell` runs before the program ends at once.
     pub fn on_ctrl_c(farewell: impl Fn() + Send + 'static) -> Outcome<Self> {
         let presses = Arc::new(AtomicUsize::new(0));
         let counted = presses.clone();
@@ -25,11 +27,12 @@ impl Stop {
         Ok(Self(presses))
     }
 
+    /// Whether training is asked to stop.
     pub fn is_wanted(&self) -> bool {
         self.0.load(Ordering::SeqCst) > 0
     }
 
-    /// From now on the first Ctrl-C ends the program. Says whether there was one before.
+    /// Lets the next Ctrl-C end the program. Returns whether there was one before.
     pub fn release(self) -> bool {
         self.0.swap(1, Ordering::SeqCst) > 0
     }

@@ -169,7 +169,7 @@ mod signals {
         let status = running.0.wait().expect("the program ends");
         assert!(status.success());
         let said = talk(&mut running);
-        assert!(said.contains("stopped; go on with"), "{said}");
+        assert!(said.contains("stopped; continue with"), "{said}");
         assert!(said.contains("train --resume run"), "{said}");
 
         assert!(logged() < ITERATIONS as u64, "it stopped before its end");
@@ -196,7 +196,7 @@ mod signals {
         // Success when the signal came just before the evaluation.
         assert!(matches!(status.code(), Some(0 | 130)), "{status}");
         let said = talk(&mut running);
-        assert!(said.contains("stopped; go on with"), "{said}");
+        assert!(said.contains("stopped; continue with"), "{said}");
         assert!(!bench.path("run/eval.json").exists());
 
         let resume = ["train", "--resume", "run"];

@@ -1,0 +1,36 @@
+//! How a run that was stopped is continued.
+
+use crate::failure::Failure;
+use mimic::run::{Run, RunError};
+
+/// The program as it was typed, for commands that can be copied: in a fresh clone it is not `mimic`.
+pub fn program() -> String {
+    let program = std::env::args_os().next();
+    program.map_or_else(
+        || "mimic".into(),
+        |program| program.to_string_lossy().into_owned(),
+    )
+}
+
+/// How to continue a run that was stopped.
+pub fn farewell(run: &Run) -> String {
+    format!(
+        "stopped; continue with `{} train --resume {}`",
+        program(),
+        run.dir().display()
+    )
+}
+
+/// The failure of a run that cannot be written any more, because the disk is full for example: what was saved last is
+/// whole, so the run can be continued.
+pub fn unwritten(run: &Run, error: RunError) -> Failure {
+    let resume = format!(
+        "check its permissions and the free space there, then continue with `{} train --resume {}`",
+        program(),
+        run.dir().display()
+    );
+    match error.is_write() {
+        true => Failure::from(error).with_remedy(resume),
+        false => Failure::from(error),
+    }
+}
