@@ -5,12 +5,13 @@
 
 mod content;
 mod performance;
-#[cfg(feature = "rerun")]
+#[cfg_attr(not(feature = "rerun"), path = "without.rs")]
 mod rrd;
+mod save;
 
 pub use content::{Recording, Sink};
-#[cfg(feature = "rerun")]
 pub use rrd::write;
+pub use save::{save, write_file};
 
 use crate::failure::{Failure, Outcome};
 
@@ -27,13 +28,4 @@ pub fn require() -> Outcome {
         return Ok(());
     }
     Err(Failure::work("this build of mimic cannot write recordings").with_remedy(HOW_TO_GET))
-}
-
-/// The writer of a build that has none; [`require`] is asked first.
-///
-/// # Errors
-/// Always.
-#[cfg(not(feature = "rerun"))]
-pub fn write(_: &Recording, _: &Sink) -> Result<(), Box<dyn std::error::Error>> {
-    Err("built without the feature `rerun`".into())
 }

@@ -3,7 +3,7 @@
 use crate::args::{ImportArgs, RetargetArgs, at_least_one};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{make_room, result_path};
+use crate::output::result_path;
 use crate::prepare::Preparation;
 use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
@@ -242,7 +242,7 @@ impl Sinks {
         printer: &Printer,
     ) -> Outcome {
         if let Some(path) = saved {
-            save(shown, path, source)?;
+            recording::save(shown, path, source)?;
         }
         if let Some(place) = &self.connect {
             send(shown, viewer::address(place))?;
@@ -268,29 +268,6 @@ impl Sinks {
     }
 }
 
-/// Writes to a temporary file beside `path` and renames it, so that nobody finds half a recording.
-pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
-    make_room(path, source, "rrd")?;
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mimic-").suffix(".rrd");
-    // Temporary files are private by default; this one becomes a file like any other.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let part = builder
-        .tempfile_in(folder.unwrap_or(Path::new(".")))
-        .map_err(|e| Failure::write(path, e))?;
-    write(shown, part.path(), path)?;
-    part.persist(path)
-        .map_err(|e| Failure::write(path, e.error))?;
-    Ok(())
-}
-
-/// Writes into `part`, which becomes `path`.
-fn write(shown: &Recording, part: &Path, path: &Path) -> Outcome {
-    recording::write(shown, &Sink::File(part.to_path_buf())).map_err(|e| Failure::write(path, e))
-}
-
 fn send(shown: &Recording, address: String) -> Outcome {
     viewer::reach(&address)?;
     let failed = |e| {
@@ -305,6 +282,6 @@ fn serve(shown: &Recording, viewer: &Viewer) -> Outcome {
     let mut builder = tempfile::Builder::new();
     let file = builder.prefix("mimic-").suffix(".rrd").tempfile();
     let file = file.map_err(failed)?;
-    write(shown, file.path(), file.path())?;
+    recording::write_file(shown, file.path(), file.path())?;
     viewer.serve(file.path())
 }

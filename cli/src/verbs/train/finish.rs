@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::recording;
 use crate::runs;
-use crate::verbs::{eval, replay};
+use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
 use mimic::run::{Run, Session, files};
@@ -68,7 +68,7 @@ fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
     match runs::record(run, start, REPLAY_S) {
         Ok(shown) => {
             let file = run.dir().join(files::RECORDING);
-            replay::save(&shown, &file, run.dir())?;
+            recording::save(&shown, &file, run.dir())?;
             Ok(Some(file))
         }
         Err(failure) => {
