@@ -14,7 +14,9 @@ use std::path::PathBuf;
 
 /// A motion, and the skeleton that it moves.
 pub struct Prepared {
+    /// The motion.
     pub motion: Motion,
+    /// The skeleton.
     pub skeleton: Skeleton,
     /// How long retargeting took; `None` for a motion that was read from a file.
     pub seconds: Option<f64>,
@@ -22,6 +24,7 @@ pub struct Prepared {
 
 /// A file, and how to make a motion of it.
 pub struct Preparation {
+    /// The file that was given.
     pub file: PathBuf,
     import: ImportArgs,
     retarget: RetargetArgs,
@@ -92,6 +95,7 @@ impl Preparation {
         })
     }
 
+    /// Reads a motion and finds its skeleton.
     fn load(&self, printer: &Printer) -> Outcome<Prepared> {
         self.import.refuse_for(&self.file, "a motion")?;
         let flags = [
@@ -130,6 +134,7 @@ impl Preparation {
         })
     }
 
+    /// Reads or imports the clip.
     fn clip(&self) -> Outcome<Clip> {
         let file = &self.file;
         if locate::has_extension(file, "clip") {
@@ -139,6 +144,7 @@ impl Preparation {
         Ok(import::load(file, &self.import.options())?)
     }
 
+    /// The joint map of `--map`, if there is one.
     fn map(&self, clip: &Clip) -> Outcome<Option<HumanoidMap>> {
         let Some(path) = &self.retarget.map else {
             return Ok(None);

@@ -24,13 +24,17 @@ const COLORS: [&str; 7] = [
 /// The scale of a panel's vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
+    /// Equal steps are equal differences.
     Linear,
+    /// Equal steps are equal factors.
     Logarithmic,
 }
 
 /// One figure of all runs.
 pub struct Panel {
+    /// What the panel shows, with its unit.
     pub heading: &'static str,
+    /// The scale of its vertical axis.
     pub scale: Scale,
     /// One per run, in the order of the legend; empty where a run has none.
     pub curves: Vec<Curve>,
@@ -39,6 +43,7 @@ pub struct Panel {
 /// Points of one run, (samples, value), in order of samples; values are finite.
 #[derive(Clone, Debug, Default)]
 pub struct Curve {
+    /// The values as they were logged.
     pub raw: Vec<(f64, f64)>,
     /// The smoothed curve, drawn in front; the same as `raw` if nothing is smoothed.
     pub smooth: Vec<(f64, f64)>,
@@ -90,6 +95,7 @@ fn color(run: usize) -> &'static str {
     COLORS[run % COLORS.len()]
 }
 
+/// Draws one panel with its top left corner at `[left, top]`, over samples from 0 to `most`.
 fn draw(body: &mut String, panel: &Panel, [left, top]: [f64; 2], most: f64) {
     let [width, height] = PANEL;
     text(body, [left, top - 8.0], "heading", panel.heading);

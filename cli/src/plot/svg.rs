@@ -19,6 +19,7 @@ pub fn short(value: f64) -> String {
     format!("{}", (value * 1e4).round() / 1e4 + 0.0)
 }
 
+/// Text as it may stand in an SVG file.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;")
 }

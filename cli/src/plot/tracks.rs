@@ -14,6 +14,7 @@ const LANE: f64 = 20.0;
 
 const COLORS: [&str; 4] = ["#c8553d", "#2a7f9e", "#6a994e", "#444444"];
 
+/// A curve of a panel.
 struct Line<'a> {
     name: &'a str,
     color: &'a str,
@@ -47,6 +48,7 @@ pub fn tracks(motion: &Motion) -> String {
     sheet.finish()
 }
 
+/// The three components of a track as curves.
 fn xyz(track: &[nalgebra::Vector3<f64>]) -> [Line<'static>; 3] {
     let names = ["x forward", "y left", "z up"];
     std::array::from_fn(|axis| Line {
@@ -56,6 +58,7 @@ fn xyz(track: &[nalgebra::Vector3<f64>]) -> [Line<'static>; 3] {
     })
 }
 
+/// The drawing so far.
 struct Sheet {
     body: String,
     /// Top of the next panel.
@@ -110,6 +113,7 @@ impl Sheet {
         self.y = top + height + GAP;
     }
 
+    /// Draws a panel with its curves, axis and legend.
     fn panel(&mut self, heading: &str, lines: &[Line]) {
         self.heading(heading);
         let all = || {

@@ -14,8 +14,11 @@ use std::path::PathBuf;
 /// The side of the body that a part belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Side {
+    /// The character's left.
     Left,
+    /// The trunk and the head.
     Middle,
+    /// The character's right.
     Right,
 }
 
@@ -29,8 +32,11 @@ pub enum Sink {
 
 /// One body of the character as it is drawn.
 pub struct Part {
+    /// Name of the body.
     pub name: String,
+    /// Its side, which decides its colour.
     pub side: Side,
+    /// Its shapes, in the body's frame.
     pub shapes: Vec<Shape>,
 }
 
@@ -60,7 +66,9 @@ impl Actor {
 
 /// A named number per frame.
 pub struct Curve {
+    /// Name in the legend.
     pub name: String,
+    /// One per frame.
     pub values: Vec<f64>,
 }
 
@@ -75,13 +83,19 @@ pub struct Shove {
 
 /// All that a recording shows.
 pub struct Recording {
+    /// Name of the motion.
     pub name: String,
+    /// Frames per second.
     pub fps: f64,
+    /// The bodies of the character, in the skeleton's order.
     pub parts: Vec<Part>,
     /// Indices of the parts that may touch the ground.
     pub contact_parts: Vec<usize>,
+    /// The reference, or an agent that has none.
     pub reference: Actor,
+    /// The agent beside its reference.
     pub agent: Option<Actor>,
+    /// Phase of the reference in each frame, 0 to 1.
     pub phase: Vec<f64>,
     /// Reward terms, each from 0 to 1.
     pub rewards: Vec<Curve>,
@@ -89,6 +103,7 @@ pub struct Recording {
     pub beside: f64,
     /// When the agent fails, seconds from the first frame; `None` if it lasts.
     pub failed_s: Option<f64>,
+    /// When the agent is shoved, and how.
     pub shoves: Vec<Shove>,
     /// Index of the part that is shoved.
     pub trunk: usize,

@@ -45,6 +45,7 @@ impl Recording {
 }
 
 impl Actor {
+    /// From body poses, dynamics and contacts of every frame.
     fn of_frames(frames: impl Iterator<Item = (Vec<Isometry3<f64>>, Dynamics, Vec<bool>)>) -> Self {
         let mut actor = Self {
             poses: Vec::new(),
@@ -64,6 +65,7 @@ impl Actor {
     }
 }
 
+/// The frames in which the agent was pushed.
 fn shoves(episode: &Episode) -> Vec<Shove> {
     let frames = episode.frames.iter().enumerate();
     let shove = |(number, frame): (usize, &Frame)| {
@@ -75,6 +77,7 @@ fn shoves(episode: &Episode) -> Vec<Shove> {
     frames.filter_map(shove).collect()
 }
 
+/// A curve for every reward term.
 fn rewards(names: &[&str], frames: &[Frame]) -> Vec<Curve> {
     let term = |(index, name): (usize, &&str)| Curve {
         name: name.replace('_', " "),

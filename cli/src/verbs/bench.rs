@@ -51,17 +51,27 @@ fn seconds(text: &str) -> Result<f64, String> {
     runs::at_most(text, MOST_SECONDS, "seconds")
 }
 
+/// What was measured.
 #[derive(Serialize)]
 struct Report {
     threads: usize,
+    /// Physics steps of one character each, all threads together.
     physics_steps_per_second: f64,
+    /// Control steps with observation and reward, without a network.
     env_steps_per_second: f64,
+    /// Samples of whole training iterations.
     train_samples_per_second: f64,
+    /// Control steps per second of simulated time.
     control_hz: f64,
+    /// Physics steps per second of simulated time.
     physics_hz: f64,
+    /// Degrees of freedom that the policy drives.
     dof: usize,
+    /// Widths of the hidden layers.
     network: Vec<usize>,
+    /// Samples of a reference motion on one thread.
     reference_frames_per_second: f64,
+    /// Frames that the retargeter solves on one thread.
     retarget_frames_per_second: f64,
 }
 
@@ -72,10 +82,12 @@ struct Bench {
     task: Arc<dyn Task>,
     reference: Arc<Reference>,
     threads: usize,
+    /// Length of each measurement.
     time: Duration,
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, printer: &Printer) -> Outcome {
         let threads = runs::use_threads(self.threads)?;
         let bench = Bench::new(threads, Duration::from_secs_f64(self.seconds))?;
@@ -137,6 +149,7 @@ impl Bench {
         })
     }
 
+    /// Frames that are retargeted per second.
     fn retarget(&self) -> Outcome<f64> {
         let options = retarget::Options::default();
         let once = || retarget::retarget(&self.clip, &self.task.model().skeleton, &options);
@@ -147,6 +160,7 @@ impl Bench {
         })
     }
 
+    /// Samples of the reference per second.
     fn reference(&self) -> Outcome<f64> {
         let mut sample = self.reference.blank();
         let mut time = 0.0;
@@ -164,8 +178,7 @@ impl Bench {
         i as f64 / self.plan.group as f64
     }
 
-    /// Integrations of joints and contacts, at `physics_hz`, of characters that fall to the ground; each thread steps as
-    /// many at once as in training.
+    /// Physics steps per second of characters that fall to the ground. Each thread steps as many at once as in training.
     fn physics(&self) -> Outcome<f64> {
         let settings = *self.plan.task.physics();
         self.on_all_threads(|| {
@@ -189,7 +202,7 @@ impl Bench {
         })
     }
 
-    /// Control steps with observation, reward and reference, without a network.
+    /// Control steps per second with observation, reward and reference, without a network.
     fn environment(&self) -> Outcome<f64> {
         self.on_all_threads(|| {
             let new = |_| self.task.environment(Purpose::Training);
@@ -215,7 +228,7 @@ impl Bench {
         })
     }
 
-    /// Whole iterations: acting, physics, learning.
+    /// Samples per second of whole iterations: acting, physics and learning.
     fn train(&self) -> Outcome<f64> {
         let mut trainer = Trainer::new(self.plan.trainer(), self.task.clone())?;
         trainer.iterate()?;
@@ -236,6 +249,7 @@ impl Bench {
         Ok(done as f64 / start.elapsed().as_secs_f64())
     }
 
+    /// The sum of what `work` reaches on every thread at once.
     fn on_all_threads(&self, work: impl Fn() -> Outcome<f64> + Sync) -> Outcome<f64> {
         (0..self.threads)
             .into_par_iter()

@@ -22,6 +22,7 @@ pub struct Args {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, mut command: Command, printer: &Printer) -> Outcome {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut command, "mimic", &mut script);

@@ -20,9 +20,11 @@ Exit code 1 means that something necessary is missing. Optional things don't cou
 #[command(after_help = EXAMPLES)]
 pub struct Args {}
 
+/// What a check found.
 #[derive(Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum State {
+    /// All is well.
     Good,
     /// Something is slower or unavailable without it.
     Weak,
@@ -30,6 +32,7 @@ enum State {
     Missing,
 }
 
+/// One line of the table.
 #[derive(Serialize)]
 struct Check {
     id: &'static str,
@@ -40,6 +43,7 @@ struct Check {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let checks = [cores(), simd(), folder(), viewer(), clips(library)];
         let missing: Vec<_> = ids(&checks, State::Missing);

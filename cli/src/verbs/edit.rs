@@ -89,6 +89,7 @@ struct Edits {
 struct Points(Vec<(f64, f64)>);
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         self.refuse_nothing()?;
         let inputs = self.clips.iter();
@@ -102,8 +103,7 @@ impl Args {
         for input in &inputs {
             clips.push(self.edits.prepare(input)?);
         }
-        let edited = self.edits.apply(clips);
-        let mut clip = edited.map_err(|e| Failure::in_file(first, e))?;
+        let mut clip = self.edits.apply(clips, first)?;
         clip.name = output
             .file_stem()
             .unwrap_or_default()
@@ -176,30 +176,32 @@ impl Edits {
         })
     }
 
-    /// Joins the clips and applies the edits that come after that.
-    fn apply(&self, clips: Vec<Clip>) -> Result<Clip, mimic::clip::Error> {
+    /// Joins the clips and applies the edits that come after that. What goes wrong is blamed on the file of the `first`.
+    fn apply(&self, clips: Vec<Clip>, first: &Path) -> Outcome<Clip> {
+        let wrong = |e| Failure::in_file(first, e);
         let mut clip = match <[Clip; 1]>::try_from(clips) {
             Ok([one]) => one,
-            Err(several) => Clip::join(&several, self.blend.unwrap_or(BLEND))?,
+            Err(several) => Clip::join(&several, self.blend.unwrap_or(BLEND)).map_err(wrong)?,
         };
         if self.loops {
-            clip = clip.cut_loop(self.shortest.unwrap_or(SHORTEST))?;
+            let shortest = self.shortest.unwrap_or(SHORTEST);
+            clip = clip.cut_loop(shortest).map_err(wrong)?;
         }
         let fps = self.fps.unwrap_or(clip.fps);
         if let Some(factor) = self.speed {
-            clip = clip.speed(factor, fps)?;
+            clip = clip.speed(factor, fps).map_err(wrong)?;
         }
         if let Some(Points(points)) = &self.warp {
-            clip = clip.warp(points, fps)?;
+            clip = clip.warp(points, fps).map_err(wrong)?;
         }
         if self.in_place {
-            clip = clip.in_place()?;
+            clip = clip.in_place().map_err(wrong)?;
         }
         if let Some((x, y)) = self.travel {
-            clip = clip.travel([x, y].into())?;
+            clip = clip.travel([x, y].into()).map_err(wrong)?;
         }
         match self.fps {
-            Some(fps) => clip.resample(fps),
+            Some(fps) => clip.resample(fps).map_err(wrong),
             None => Ok(clip),
         }
     }

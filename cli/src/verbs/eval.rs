@@ -56,6 +56,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, printer: &Printer) -> Outcome {
         runs::use_threads(self.threads)?;
         let run = runs::open(self.run.as_deref())?;

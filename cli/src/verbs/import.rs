@@ -48,6 +48,7 @@ struct Step {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let steps = self.plan(library)?;
         let bar = printer.progress(steps.len() as u64, "{bar:30} {pos}/{len} {msg}");

@@ -52,6 +52,7 @@ pub struct Row {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let file = locate::clip(&self.file, library, &locate::CLIPS)?;
         let (mut report, joints) = look(&file)?;

@@ -23,6 +23,7 @@ pub struct Args {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, command: Command, printer: &Printer) -> Outcome {
         let mut command = command.disable_help_subcommand(true);
         command.build();

@@ -74,6 +74,7 @@ struct Log {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, printer: &Printer) -> Outcome {
         let folders = match self.runs.is_empty() {
             true => vec![locate::run(None)?],

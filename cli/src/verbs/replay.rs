@@ -113,6 +113,7 @@ struct Sinks {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         recording::require()?;
         let viewer = (self.sinks.rerun || self.sinks.serve)

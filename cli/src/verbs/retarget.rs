@@ -38,6 +38,7 @@ pub struct Args {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let file = locate::file_or_newest(self.clip.as_deref(), library, &locate::CLIPS, "clip")?;
         let preparation = Preparation::new(file.clone(), &self.import, &self.retarget)

@@ -57,6 +57,7 @@ struct Report {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let file = locate::file_or_newest(
             self.motion.as_deref(),

@@ -117,6 +117,7 @@ enum End {
 }
 
 impl Args {
+    /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let threads = runs::use_threads(self.threads)?;
         let run = match &self.resume {
@@ -210,7 +211,7 @@ impl Args {
         if let Some(out) = &self.out {
             if locate::is_run(out) {
                 return Err(
-                    Failure::input(out, "this folder holds a run already").with_remedy(format!(
+                    Failure::input(out, "this folder already holds a run").with_remedy(format!(
                         "choose another folder with `--out`, or continue that run with `--resume {}`",
                         out.display()
                     )),
