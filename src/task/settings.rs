@@ -37,6 +37,14 @@ impl TaskSettings {
         }
     }
 
+    /// The default settings of the task of this name, one of [`TASKS`].
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            imitate::NAME => Some(Self::default()),
+            _ => None,
+        }
+    }
+
     /// The task with these settings, for a character and its motions.
     ///
     /// # Errors

@@ -95,7 +95,7 @@ pub struct Recording {
     pub reference: Actor,
     /// The agent beside its reference.
     pub agent: Option<Actor>,
-    /// Phase of the reference in each frame, 0 to 1.
+    /// Phase of the reference in each frame, 0 to 1; empty where there is no reference.
     pub phase: Vec<f64>,
     /// Reward terms, each from 0 to 1.
     pub rewards: Vec<Curve>,
@@ -110,6 +110,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// How many frames there are.
+    pub fn frames(&self) -> usize {
+        self.reference.poses.len()
+    }
+
     /// The recording of a motion without an agent.
     pub fn of_motion(motion: &Motion, skeleton: &Skeleton) -> Self {
         Self {

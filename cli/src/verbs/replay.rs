@@ -129,7 +129,7 @@ impl Args {
         let json = json!({
             "name": shown.name,
             "recording": saved,
-            "frames": shown.phase.len(),
+            "frames": shown.frames(),
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
             "perturbed": self.perturb,
@@ -206,7 +206,7 @@ fn phase_number(phase: f64) -> u64 {
 }
 
 fn summary(shown: &Recording, saved: Option<&Path>, perturbed: bool) -> String {
-    let frames = shown.phase.len();
+    let frames = shown.frames();
     let who = if shown.agent.is_some() {
         "agent and reference"
     } else {

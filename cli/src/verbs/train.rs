@@ -61,9 +61,9 @@ pub struct Args {
     /// Motions, clips or animation files; one policy learns all of them [default: the newest motion]
     #[arg(value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// What the policy learns
-    #[arg(long, value_name = "TASK", value_parser = tasks(), default_value = TASKS[0].0)]
-    task: String,
+    /// What the policy learns [default: the preset's task]
+    #[arg(long, value_name = "TASK", value_parser = tasks())]
+    task: Option<String>,
     /// Settings to start from: `default`, `deepmimic`, `deepmimic2018`, `booth2020`, those of a run, or a JSON file with a
     /// plan as in a run's config.json
     #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
@@ -149,14 +149,6 @@ impl Args {
     /// Makes the run. Everything that it needs is read and checked before its folder appears.
     fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
         let preset = self.preset()?;
-        let task = preset.plan.task.name();
-        if self.task != task {
-            return Err(Failure::user(format!(
-                "`--task {}` does not fit the preset, which is for the task `{task}`",
-                self.task
-            ))
-            .with_remedy("choose another preset"));
-        }
         let preparations = self.preparations(library, preset.skeleton)?;
         let folder = self.folder(&preparations, printer)?;
         let mut motions = Vec::new();
@@ -241,6 +233,9 @@ impl Args {
     /// The settings of the preset, with the changes of the command line.
     fn preset(&self) -> Outcome<Preset> {
         let mut preset = Preset::load(&self.preset)?;
+        if let Some(task) = &self.task {
+            preset.choose_task(task)?;
+        }
         if self.perturb {
             let perturbations = preset.plan.task.perturbations_mut();
             *perturbations = perturbations.or_usual();

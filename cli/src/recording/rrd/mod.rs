@@ -35,7 +35,7 @@ pub fn write(shown: &Recording, sink: &Sink) -> Result<(), Box<dyn std::error::E
 
 fn log(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {
     blueprint::send(stream, shown)?;
-    let frames = shown.phase.len();
+    let frames = shown.frames();
     let seconds = (0..frames).map(|f| f as f64 / shown.fps);
     let times = [
         TimeColumn::new_duration_secs(TIMELINE, seconds),

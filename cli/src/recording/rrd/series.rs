@@ -16,14 +16,11 @@ pub fn log(
     shown: &Recording,
     times: &[TimeColumn],
 ) -> RecordingStreamResult<()> {
-    line(
-        stream,
-        "plots/phase",
-        "phase",
-        look::PHASE,
-        shown.phase.iter().copied(),
-        times,
-    )?;
+    // A task without a reference has no phase.
+    if !shown.phase.is_empty() {
+        let phase = shown.phase.iter().copied();
+        line(stream, "plots/phase", "phase", look::PHASE, phase, times)?;
+    }
     for (index, term) in shown.rewards.iter().enumerate() {
         let path = format!("plots/rewards/{}", term.name);
         let values = term.values.iter().copied();

@@ -4,6 +4,7 @@ use super::setting;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use mimic::run::{PRESETS, Plan, RunError, files, preset};
+use mimic::task::TaskSettings;
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
