@@ -52,6 +52,22 @@ impl Preset {
         })
     }
 
+    /// Takes the default settings of the task `name`, unless the preset is for that task anyway.
+    pub fn choose_task(&mut self, name: &str) -> Outcome {
+        let own = self.plan.task.name();
+        if own == name {
+            return Ok(());
+        }
+        match TaskSettings::named(name) {
+            Some(task) if self.plan == Plan::default() => self.plan.task = task,
+            _ => {
+                let cause = format!("the preset is for the task `{own}`, not `{name}`");
+                return Err(Failure::user(cause).with_remedy("choose another preset"));
+            }
+        }
+        Ok(())
+    }
+
     /// Changes single settings, such as `task.terminations.distance=0.4`.
     pub fn change(&mut self, changes: &[String]) -> Outcome {
         for change in changes {
