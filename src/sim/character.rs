@@ -2,7 +2,7 @@
 
 use super::error::SimError;
 use super::state::LinkState;
-use crate::skeleton::{Body, Drive, JointKind, Shape, Skeleton, point_inertia};
+use crate::skeleton::{Body, Drive, Joint, JointKind, Shape, Skeleton, point_inertia};
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
@@ -297,32 +297,15 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
             _ => Err(SimError::RootIsNotFree { body: name() }),
         };
     }
-    let too_many = || SimError::TooManyJoints {
-        body: name(),
-        count: body.joints.len(),
-    };
-    let mut hinges = Vec::new();
-    for joint in &body.joints {
-        match joint.kind {
-            JointKind::Ball if body.joints.len() == 1 => {
-                return Ok(LinkJoint::Ball {
-                    drives: [joint.drives[0], joint.drives[1], joint.drives[2]],
-                    limits: [joint.limits[0], joint.limits[1], joint.limits[2]],
-                });
-            }
-            JointKind::Hinge(direction) => {
-                let limit = joint.limits[0];
-                hinges.push((HingeAxis { direction, limit }, joint.drives[0]));
-            }
-            JointKind::Slide(_) => {
-                return Err(SimError::SlideJoint {
-                    body: name(),
-                    joint: joint.name.clone(),
-                });
-            }
-            _ => return Err(too_many()),
-        }
+    if let [joint] = body.joints.as_slice()
+        && joint.kind == JointKind::Ball
+    {
+        return Ok(LinkJoint::Ball {
+            drives: [joint.drives[0], joint.drives[1], joint.drives[2]],
+            limits: [joint.limits[0], joint.limits[1], joint.limits[2]],
+        });
     }
+    let hinges = hinges(body)?;
     match hinges.as_slice() {
         [(axis, drive)] => Ok(LinkJoint::Hinge {
             axis: *axis,
@@ -331,7 +314,30 @@ fn link_joint(body: &Body, is_root: bool) -> Result<LinkJoint, SimError> {
         [_, _] | [_, _, _] => {
             hinges_of_one(&hinges).ok_or_else(|| SimError::ParallelHinges { body: name() })
         }
-        _ => Err(too_many()),
+        _ => Err(too_many(body)),
+    }
+}
+
+/// The hinges of a body that has no other joints.
+fn hinges(body: &Body) -> Result<Vec<(HingeAxis, Drive)>, SimError> {
+    let hinge = |joint: &Joint| match joint.kind {
+        JointKind::Hinge(direction) => {
+            let limit = joint.limits[0];
+            Ok((HingeAxis { direction, limit }, joint.drives[0]))
+        }
+        JointKind::Slide(_) => Err(SimError::SlideJoint {
+            body: body.name.clone(),
+            joint: joint.name.clone(),
+        }),
+        JointKind::Free | JointKind::Ball => Err(too_many(body)),
+    };
+    body.joints.iter().map(hinge).collect()
+}
+
+fn too_many(body: &Body) -> SimError {
+    SimError::TooManyJoints {
+        body: body.name.clone(),
+        count: body.joints.len(),
     }
 }
 

@@ -46,6 +46,29 @@ pub enum SkeletonError {
 }
 
 impl SkeletonError {
+    /// A defect at `place` of the MJCF of `skeleton`.
+    pub(super) fn mjcf(skeleton: &str, place: Option<String>, defect: Defect) -> Self {
+        let Defect { cause, remedy } = defect;
+        Self::Mjcf {
+            skeleton: skeleton.into(),
+            file: None,
+            place,
+            cause,
+            remedy,
+        }
+    }
+
+    /// A defect of the slots of `skeleton`.
+    pub(super) fn slots(skeleton: &str, defect: Defect) -> Self {
+        let Defect { cause, remedy } = defect;
+        Self::Slots {
+            skeleton: skeleton.into(),
+            file: None,
+            cause,
+            remedy,
+        }
+    }
+
     /// The same error with the names of the files that the texts came from.
     pub(super) fn in_files(mut self, mjcf: &Path, slots: &Path) -> Self {
         match &mut self {

@@ -16,6 +16,7 @@
 //! # Ok::<(), mimic::skeleton::SkeletonError>(())
 //! ```
 
+mod build;
 mod coordinates;
 mod drive;
 mod error;
@@ -53,6 +54,26 @@ pub enum JointKind {
     Hinge(Vector3<f64>),
     /// Moves along a unit axis, in the child body's frame.
     Slide(Vector3<f64>),
+}
+
+impl JointKind {
+    /// Number of coordinates in `qpos`.
+    pub fn nq(self) -> usize {
+        match self {
+            Self::Free => 7,
+            Self::Ball => 4,
+            Self::Hinge(_) | Self::Slide(_) => 1,
+        }
+    }
+
+    /// Number of coordinates in `qvel`: the degrees of freedom.
+    pub fn nv(self) -> usize {
+        match self {
+            Self::Free => 6,
+            Self::Ball => 3,
+            Self::Hinge(_) | Self::Slide(_) => 1,
+        }
+    }
 }
 
 /// A position drive on one degree of freedom, as MuJoCo's `position` actuator:

@@ -1,0 +1,284 @@
+//! Builds the bodies of a character from a parsed MJCF model, as MuJoCo's compiler would.
+
+use super::error::{Defect, SkeletonError};
+use super::inertia::{MassProperties, set_total_mass};
+use super::shape::{Solid, isometry};
+use super::{Body, Joint, JointKind, drive};
+use mjcf_rs::Model;
+use mjcf_rs::body::{Body as MjcfBody, GeomType, Joint as MjcfJoint, JointType};
+use mjcf_rs::compiler::InertiaFromGeom;
+use nalgebra::Vector3;
+
+/// What to do about numbers such as `nan` and `1e999`.
+const FINITE: &str = "write finite numbers";
+
+/// The bodies of a character and the sizes of its coordinates.
+pub(super) struct Built {
+    pub bodies: Vec<Body>,
+    pub nq: usize,
+    pub nv: usize,
+}
+
+/// Builds the bodies of `model`, parents before children. `skeleton` is the name for errors.
+pub(super) fn bodies(skeleton: &str, model: &Model) -> Result<Built, SkeletonError> {
+    let mut builder = Builder::new(skeleton, model);
+    builder.add_bodies()?;
+    let Builder {
+        mut bodies, nq, nv, ..
+    } = builder;
+    set_total_mass(&mut bodies, model.compiler.set_total_mass);
+    check_masses(skeleton, &bodies)?;
+    Ok(Built { bodies, nq, nv })
+}
+
+/// Collects the bodies of the character out of a parsed model.
+struct Builder<'a> {
+    skeleton: &'a str,
+    model: &'a Model,
+    bodies: Vec<Body>,
+    /// Our index of each body of the model; `None` for scenery.
+    index: Vec<Option<usize>>,
+    nq: usize,
+    nv: usize,
+}
+
+impl<'a> Builder<'a> {
+    fn new(skeleton: &'a str, model: &'a Model) -> Self {
+        Self {
+            skeleton,
+            model,
+            bodies: Vec::new(),
+            index: vec![None; model.bodies.len()],
+            nq: 0,
+            nv: 0,
+        }
+    }
+
+    fn error(&self, place: impl Into<String>, defect: Defect) -> SkeletonError {
+        SkeletonError::mjcf(self.skeleton, Some(place.into()), defect)
+    }
+
+    fn add_bodies(&mut self) -> Result<(), SkeletonError> {
+        let model = self.model;
+        for (id, entry) in model.bodies_iter() {
+            let parent = entry.parent.and_then(|p| self.index.get(p).copied());
+            let parent = parent.flatten();
+            let joints = &entry.body.joints;
+            let free = joints.iter().any(|j| j.type_ == JointType::Free);
+            let name = entry.body.name.clone();
+            let name = name.unwrap_or_else(|| format!("body{id}"));
+            // A body that is fixed to the world is scenery, and so is the world body itself.
+            if parent.is_none() && joints.is_empty() {
+                continue;
+            }
+            self.check_place(&name, parent.is_some(), free, joints.len())?;
+            let body = self.body(name, parent, &entry.body)?;
+            self.index[id] = Some(self.bodies.len());
+            self.bodies.push(body);
+        }
+        if self.bodies.is_empty() {
+            let defect = Defect::new(
+                "no body has a free joint",
+                "add <freejoint/> to the character's top body",
+            );
+            return Err(self.error("<worldbody>", defect));
+        }
+        Ok(())
+    }
+
+    /// Checks that a body fits into one tree whose root is free.
+    fn check_place(
+        &self,
+        name: &str,
+        has_parent: bool,
+        free: bool,
+        joints: usize,
+    ) -> Result<(), SkeletonError> {
+        let (cause, remedy) = match (has_parent, free) {
+            (false, false) => (
+                "it moves, but no body above it has a free joint",
+                "add <freejoint/> to the character's top body, and remove scenery that has joints",
+            ),
+            (false, true) if !self.bodies.is_empty() => (
+                "it is a second moving tree",
+                "keep one character in the file and remove the rest",
+            ),
+            (false, true) if joints > 1 => (
+                "it has other joints beside its free joint",
+                "keep the free joint alone",
+            ),
+            (true, true) => (
+                "it has a free joint below the top body",
+                "replace the free joint with a ball joint or hinges",
+            ),
+            _ if self.bodies.iter().any(|b| b.name == name) => (
+                "the name is used twice",
+                "give every body a name of its own",
+            ),
+            _ => return Ok(()),
+        };
+        Err(self.error(format!("body `{name}`"), Defect::new(cause, remedy)))
+    }
+
+    fn body(
+        &mut self,
+        name: String,
+        parent: Option<usize>,
+        body: &MjcfBody,
+    ) -> Result<Body, SkeletonError> {
+        let place = format!("body `{name}`");
+        let rest = isometry(&body.pose);
+        if !rest.to_homogeneous().iter().all(|x| x.is_finite()) {
+            let defect = Defect::new("its `pos` or rotation is not finite", FINITE);
+            return Err(self.error(place, defect));
+        }
+        let solids = self.solids(body, &place)?;
+        let properties = self.mass_properties(body, &solids, &place)?;
+        let joints = body
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(i, joint)| self.joint(&name, i, joint))
+            .collect::<Result<Vec<_>, _>>()?;
+        let colliding = solids.iter().filter(|s| s.collides);
+        // MuJoCo takes the larger friction of the two geoms of a contact; a body counts as one geom here. Without geoms it
+        // has MuJoCo's default for sliding friction, 1.
+        let friction = colliding.clone().map(|s| s.friction).fold(None, larger);
+        Ok(Body {
+            name,
+            parent,
+            rest,
+            joints,
+            shapes: colliding.map(Solid::shape).collect(),
+            friction: friction.unwrap_or(1.0),
+            mass: properties.mass,
+            com: properties.com,
+            inertia: properties.inertia,
+        })
+    }
+
+    fn solids(&self, body: &MjcfBody, place: &str) -> Result<Vec<Solid>, SkeletonError> {
+        let mut solids = Vec::new();
+        for geom in &body.geoms {
+            let drawn_only = geom.contype == 0 && geom.conaffinity == 0;
+            let meshed = matches!(geom.type_, GeomType::Mesh | GeomType::Sdf);
+            // A mesh that neither collides nor has a say in the mass is for the eye only.
+            if meshed && drawn_only && body.inertial.is_some() {
+                continue;
+            }
+            let solid = Solid::from_geom(geom).map_err(|defect| {
+                let place = match &geom.name {
+                    Some(name) => format!("{place}, geom `{name}`"),
+                    None => format!("{place}, a geom without a name"),
+                };
+                self.error(place, defect)
+            })?;
+            solids.extend(solid);
+        }
+        Ok(solids)
+    }
+
+    /// Mass properties from `<inertial>` or from geoms, as `<compiler inertiafromgeom>` says.
+    fn mass_properties(
+        &self,
+        body: &MjcfBody,
+        solids: &[Solid],
+        place: &str,
+    ) -> Result<MassProperties, SkeletonError> {
+        let compiler = &self.model.compiler;
+        let stated = match compiler.inertia_from_geom {
+            InertiaFromGeom::True => None,
+            InertiaFromGeom::False | InertiaFromGeom::Auto => body.inertial.as_ref(),
+        };
+        let properties = match (stated, compiler.inertia_from_geom) {
+            (Some(inertial), _) => MassProperties::from_inertial(inertial)
+                .map_err(|defect| self.error(place, defect))?,
+            (None, InertiaFromGeom::False) => MassProperties::from_solids(&[]),
+            (None, _) => MassProperties::from_solids(solids),
+        };
+        Ok(properties.bounded(compiler))
+    }
+
+    fn joint(
+        &mut self,
+        body: &str,
+        index: usize,
+        joint: &MjcfJoint,
+    ) -> Result<Joint, SkeletonError> {
+        let name = joint.name.clone().unwrap_or_else(|| match index {
+            0 => body.to_owned(),
+            n => format!("{body}_{n}"),
+        });
+        let place = format!("joint `{name}`");
+        if joint.ref_ != 0.0 {
+            let defect = Defect::new("a `ref` offset is not supported", "set `ref` to 0");
+            return Err(self.error(place, defect));
+        }
+        let kind = self.joint_kind(joint, &place)?;
+        let anchor = Vector3::from(joint.pos);
+        if !anchor.iter().all(|x| x.is_finite()) {
+            return Err(self.error(place, Defect::new("its `pos` is not finite", FINITE)));
+        }
+        let (drives, limits) = drive::drives(joint, kind, self.model)
+            .map_err(|defect| self.error(place.as_str(), defect))?;
+        let placed = Joint {
+            name,
+            kind,
+            anchor,
+            qpos: self.nq,
+            dof: self.nv,
+            drives,
+            limits,
+        };
+        self.nq += placed.kind.nq();
+        self.nv += placed.kind.nv();
+        Ok(placed)
+    }
+
+    fn joint_kind(&self, joint: &MjcfJoint, place: &str) -> Result<JointKind, SkeletonError> {
+        let axis = || {
+            // Chosen: a shorter axis is a zero that went through text and rounding.
+            Vector3::from(joint.axis)
+                .try_normalize(1e-9)
+                .filter(|a| a.iter().all(|x| x.is_finite()))
+                .ok_or_else(|| {
+                    let defect = Defect::new(
+                        "its `axis` has no direction",
+                        "write three finite numbers that are not all 0",
+                    );
+                    self.error(place, defect)
+                })
+        };
+        Ok(match joint.type_ {
+            JointType::Free => JointKind::Free,
+            JointType::Ball => JointKind::Ball,
+            JointType::Hinge => JointKind::Hinge(axis()?),
+            JointType::Slide => JointKind::Slide(axis()?),
+        })
+    }
+}
+
+fn larger(best: Option<f64>, next: f64) -> Option<f64> {
+    Some(best.map_or(next, |b| b.max(next)))
+}
+
+/// Checks that every body that moves on its own has mass, in itself or in bodies welded to it.
+fn check_masses(skeleton: &str, bodies: &[Body]) -> Result<(), SkeletonError> {
+    let mut carried: Vec<f64> = bodies.iter().map(|b| b.mass).collect();
+    // Parents come before their children, so from the last body on each welded mass reaches the body that moves it.
+    for (index, body) in bodies.iter().enumerate().rev() {
+        match body.parent {
+            Some(parent) if body.joints.is_empty() => carried[parent] += carried[index],
+            _ if carried[index] > 0.0 => {}
+            _ => {
+                let place = format!("body `{}`", body.name);
+                let defect = Defect::new(
+                    "it moves but has no mass",
+                    "give it a geom or an <inertial>",
+                );
+                return Err(SkeletonError::mjcf(skeleton, Some(place), defect));
+            }
+        }
+    }
+    Ok(())
+}
