@@ -357,6 +357,7 @@ fn hinges_of_one(hinges: &[(HingeAxis, Drive)]) -> Option<LinkJoint> {
 /// The drive of the hinge whose axis is nearest to a direction, or the stiffest drive if no axis is near.
 fn gains(hinges: &[(HingeAxis, Drive)], along: &Vector3<f64>) -> Drive {
     let share = |hinge: &(HingeAxis, Drive)| hinge.0.direction.dot(along).abs();
+    // Of equally near ones, the first counts.
     let mut best = hinges[0];
     for hinge in hinges {
         if share(hinge) > share(&best) {

@@ -124,6 +124,7 @@ fn drive(joint: &MjcfJoint, servo: Option<&Servo>) -> Drive {
             force_limit,
         };
     }
+    // Without a motor, or with one of unlimited torque, there is no limit to scale gains from.
     let passive = servo.is_none() || !force_limit.is_finite();
     let (kp, kd) = if passive || joint.stiffness >= force_limit {
         (joint.stiffness, joint.damping)
@@ -168,6 +169,7 @@ fn limit(
         JointKind::Ball => servo.or(own),
         _ => own.or(servo),
     };
+    // Neither limited: a slide may go anywhere, everything else through a full turn.
     let free = match kind {
         JointKind::Slide(_) => [f64::NEG_INFINITY, f64::INFINITY],
         _ => [-PI, PI],

@@ -51,6 +51,7 @@ impl MassProperties {
                 Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
             }
         };
+        // From the inertial frame's axes to the body's.
         let r = pose.rotation.to_rotation_matrix();
         let inertia = r * own * r.transpose();
         let finite = inertial.mass.is_finite() && inertia.iter().all(|x| x.is_finite());

@@ -62,6 +62,7 @@ impl Skeleton {
     /// If `qpos` is shorter than [`Skeleton::nq`].
     pub fn forward(&self, qpos: &[f64]) -> Vec<Isometry3<f64>> {
         let mut world: Vec<Isometry3<f64>> = Vec::with_capacity(self.bodies.len());
+        // Parents come before their children, so each pose follows from one that is known.
         for body in &self.bodies {
             let parent = body.parent.map_or_else(Isometry3::identity, |p| world[p]);
             let at = body
@@ -89,6 +90,7 @@ impl Skeleton {
                 Some(p) => (world[p], twists[p].at(&world[p], &origin)),
                 None => (Isometry3::identity(), Twist::default()),
             };
+            // The joints act in turn, and each adds the velocity of the body's final origin about its own anchor.
             at *= body.rest;
             for joint in &body.joints {
                 let next = joint.apply(&at, qpos);
@@ -125,6 +127,7 @@ impl Joint {
             JointKind::Ball => after.rotation * vector(qvel, self.dof),
             JointKind::Hinge(axis) => before.rotation * axis * qvel[self.dof],
         };
+        // A rotation about the anchor: v = ω × (origin − anchor). The joint leaves its anchor where it was.
         let anchor = before * nalgebra::Point3::from(self.anchor);
         twist.angular += angular;
         twist.linear += angular.cross(&(origin - anchor.coords));

@@ -34,6 +34,7 @@ impl Skeleton {
         twists: &[Twist],
     ) -> (Vector3<f64>, Vector3<f64>) {
         let com = self.com(poses);
+        // Each body's centre of mass and the velocity there.
         let parts: Vec<_> = self
             .bodies
             .iter()
@@ -71,6 +72,7 @@ impl Skeleton {
                 }
             }
         }
+        // With the root at the origin, part of the character is below the ground by this much.
         let sunk = self.lowest_point(&self.forward(&qpos));
         store(&mut qpos, 0, Vector3::z() * -sunk);
         qpos
@@ -99,6 +101,7 @@ impl Skeleton {
         let anchor = joint.map_or_else(Vector3::zeros, |j| j.anchor);
         let top = poses[upper] * Point3::from(anchor);
         let down = poses[lower].translation.vector - top.coords;
+        // A leg that points straight up has no unique rotation; half a turn about X serves.
         let upright = UnitQuaternion::rotation_between(&down, &-Vector3::z())
             .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * PI));
         let turned: Vec<Isometry3<f64>> = poses.iter().map(|pose| upright * pose).collect();
@@ -117,6 +120,7 @@ impl Skeleton {
     }
 
     fn lowest(&self, poses: &[Isometry3<f64>], bodies: impl Iterator<Item = usize> + Clone) -> f64 {
+        // Without any shape the fold stays infinite, and the origins of the bodies count instead.
         let shapes = bodies.clone().flat_map(|b| {
             let pose = &poses[b];
             self.bodies[b].shapes.iter().map(|s| s.lowest(pose))

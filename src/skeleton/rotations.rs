@@ -54,6 +54,7 @@ impl Skeleton {
                     JointKind::Hinge(_) | JointKind::Slide(_) => {}
                 }
             }
+            // Hinges make what is left of the rotation: all of it, unless the body also has a ball.
             let hinges: Vec<&Joint> = body.joints.iter().filter(|j| j.axis().is_some()).collect();
             for (joint, angle) in hinges.iter().zip(hinge_angles(&hinges, &rest, near)) {
                 qpos[joint.qpos] = angle;
@@ -105,6 +106,8 @@ fn hinge_angles(
     let candidates = match *axes.as_slice() {
         [] => return Vec::new(),
         [e] => vec![[twist(rotation, &e), 0.0, 0.0]],
+        // Two hinges can't make every rotation. A third one at right angles to both makes it solvable, and its angle, which
+        // would be the error, is dropped.
         [e1, e2] => davenport(e1, e2, e1.cross(&e2), rotation, wanted[0]),
         [e1, e2, e3, ..] => davenport(e1, e2, e3, rotation, wanted[0]),
     };
@@ -168,6 +171,7 @@ fn davenport(
     } else {
         0.0
     };
+    // Given b, a brings R₂ e3 to R e3 about e1, and c is what is left about e3.
     let solve = |b: f64| {
         let second = about(&e2, b);
         let a = angle_about(&e1, &(second * e3), &(rotation * e3)).unwrap_or(free);

@@ -84,6 +84,7 @@ impl<L: Lanes> Contacts<L> {
         self.near.clear();
         self.solvers.iter_mut().for_each(Solver::clear);
         let (mut id, used) = (0, (1 << lanes) - 1);
+        // Most bodies are nowhere near the ground in any lane, so a bound for the whole body comes before its points.
         for (i, node) in tree.nodes.iter().enumerate() {
             if reaches_ground(node, pose, &velocities[i], (i, ground.dt)) & used != 0 {
                 self.detect_points(tree, pose, &velocities[i], (ground, used), (i, id));
@@ -112,10 +113,12 @@ impl<L: Lanes> Contacts<L> {
         // The lowest point of each ball, in all lanes at once; then one by one those that are near the ground.
         let (mut lanes, next) = (0, self.near.len());
         for (n, (point, radius)) in node.points.iter().enumerate() {
+            // The lowest point of a ball is straight below its centre, whatever the body's orientation.
             let mut arm = frame.matrix.times(&Vec3::splat(point));
             arm.z -= L::splat(*radius);
             let gap = arm.z + frame.origin.z + pose.origin.z;
             let moving = velocity.velocity_at(&(frame.origin + arm));
+            // Near now, or so fast that it will be.
             let mut close = gap.min(gap + dt * moving.z).below(near).bits() & used;
             lanes |= close;
             while close != 0 {
@@ -144,6 +147,8 @@ impl<L: Lanes> Contacts<L> {
         if self.near.iter().all(|near| near.lanes & open == 0) {
             return;
         }
+        // For all lanes at once: Jacobians, twists without contacts, and Delassus blocks. Then the sweeps, character by
+        // character, and their impulses for all lanes at once again.
         self.prepare(tree, pose, dynamics);
         self.update_delassus(tree, open);
         self.wrenches.clear();
@@ -166,12 +171,14 @@ impl<L: Lanes> Contacts<L> {
         for (near, half) in self.near.iter().zip(half_jacobians) {
             let path = &tree.nodes[near.node].path;
             let origin = &pose.frames[near.node].origin;
+            // Column k of J: the twist that a unit of coordinate k's velocity gives the body.
             for (half, &k) in half.iter_mut().zip(path) {
                 *half = rows(&pose.axes[k], origin);
             }
             dynamics
                 .factor
                 .solve_transposed_rows(tree, path, &mut half[..path.len()]);
+            // The twist at the start of the step, and what the half solution adds to it.
             let mut twist = rows(&dynamics.velocities[near.node], origin);
             for (half, &k) in half.iter().zip(path) {
                 let change = dynamics.delta[k];
@@ -240,6 +247,7 @@ impl<L: Lanes> Contacts<L> {
             }
         }
         solver.solve();
+        // Lanes of other characters keep the zeros that the caller filled in.
         for pressed in &solver.bodies {
             let parts = self.wrenches[pressed.near].iter_mut();
             for (part, x) in parts.zip(&pressed.wrench) {

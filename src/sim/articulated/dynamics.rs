@@ -136,6 +136,7 @@ impl<L: Lanes> Dynamics<L> {
         for (i, node) in tree.nodes.iter().enumerate() {
             let joint_velocity = pose.joint_velocity(i, node);
             let frame = &pose.frames[i];
+            // The inertia is constant in the body's frame and turns with it in the world's.
             let central = Symmetric::splat(&node.inertia)
                 .rotated(&frame.matrix)
                 .scaled(self.mass_scale);
@@ -166,6 +167,7 @@ impl<L: Lanes> Dynamics<L> {
     /// momentum change by outside impulses alone, so that in flight it is constant to rounding.
     #[inline(always)]
     pub fn correct_momentum(&mut self, pose: &mut Pose<L>, momentum: &ForceVector<L>) {
+        // Back from the centre of mass, where it is after the step, to the root's origin.
         let momentum = momentum.about(&-self.total_inertia.com());
         let error = self.total_inertia.solve(&(momentum - self.momentum));
         // Every body moves with the root, and the root's coordinates are its velocity in world axes.
@@ -190,6 +192,7 @@ impl<L: Lanes> Dynamics<L> {
         pushes: &[Push],
         dt: f32,
     ) -> ForceVector<L> {
+        // Gravity acts on the whole as one force at the centre of mass; within the tree the outward pass takes care of it.
         let fall = self.total_inertia.mass * L::splat(-GRAVITY * dt);
         let weight = Vec3::new(L::ZERO, L::ZERO, fall);
         let mut impulse = ForceVector::at_point(weight, &self.total_inertia.com());
@@ -237,6 +240,7 @@ impl<L: Lanes> Dynamics<L> {
                 saturated = over.select(sign, L::ZERO);
                 exceeded |= over.and(self.held[k].is_zero()).bits();
             }
+            // Lanes that were accepted before keep what they have.
             let [delta, signs] = &mut self.accepted[k];
             *delta = mask.select(self.delta[k], *delta);
             *signs = mask.select(saturated, *signs);
@@ -287,6 +291,7 @@ impl<L: Lanes> Dynamics<L> {
         self.composites.copy_from_slice(&self.inertias);
         for (i, node) in tree.nodes.iter().enumerate().rev() {
             let (force, inertia) = (self.forces[i], self.composites[i]);
+            // A body's own coordinates, and against them all coordinates above: no others have an entry with them.
             for k in node.first..node.first + node.dof {
                 self.bias_impulses[k] = pose.axes[k].dot(&force) * minus_dt;
                 let momentum = inertia.times(&pose.axes[k]);
@@ -314,6 +319,7 @@ impl<L: Lanes> Dynamics<L> {
             match node.joint {
                 Joint::Free => {}
                 Joint::Ball => {
+                    // In the node's own frame, which is that of the coordinates.
                     let error = self.targets[i]
                         .inverse()
                         .times(&pose.rotations[i])
@@ -372,6 +378,7 @@ impl<L: Lanes> Dynamics<L> {
         if hit.bits() == 0 {
             return;
         }
+        // Scaled with the diagonal of M, so that a heavy leg and a light hand stop alike.
         let spring = L::splat(LIMIT_STIFFNESS) * self.mass_matrix.diagonal(tree, k) / (dt * dt);
         let damper = spring * dt;
         let (push, stiff) = (

@@ -51,6 +51,7 @@ impl<L: Lanes> PathMatrix<L> {
             // All rows above belong to earlier coordinates, and with them all ancestors.
             let (above, own) = self.entries.split_at_mut(c.row);
             let own = &mut own[..=c.depth];
+            // Descendants have been subtracted by now, so this row is final: divide it by the root of its diagonal.
             let inverse = L::splat(1.0) / (own[c.depth] + added[k]).sqrt();
             self.inverse[k] = inverse;
             for entry in own[..c.depth].iter_mut() {

@@ -166,6 +166,7 @@ impl<L: Lanes> Pose<L> {
                 origin,
                 pivot,
             };
+            // The joint's axes in the world: they pass through its centre.
             match node.joint {
                 Joint::Hinge(axis, _) => {
                     let axis = matrix.times(&Vec3::splat(&axis));

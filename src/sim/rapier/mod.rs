@@ -140,6 +140,7 @@ impl Rapier {
             let (rest, axes) = self.frames[i];
             match target {
                 Target::Free => {}
+                // Parent from link at rest, then the target, then the joint's own axes.
                 Target::Ball(turn) => {
                     joint.data.local_frame1.rotation = convert::rotation(rest * turn * axes)
                 }
@@ -156,6 +157,7 @@ impl Rapier {
     /// [`Diverged`] when a body stopped being finite; the world then needs a reset.
     pub fn step(&mut self) -> Result<(), Diverged> {
         for _ in 0..self.settings.steps_per_control {
+            // Joints, drives and contacts are integrated in substeps inside of this call.
             self.pipeline.step(
                 Vector::new(0.0, 0.0, -GRAVITY as f32),
                 &self.parameters,
@@ -202,6 +204,7 @@ impl Rapier {
             } else {
                 pair.collider1
             };
+            // A pair is reported as soon as its bounding boxes meet; only one with an impulse presses.
             let pressed = pair.total_impulse_magnitude() > 0.0;
             if pressed && let Some(collider) = self.state.colliders.get(other) {
                 contacts[collider.user_data as usize] = true;
