@@ -3,6 +3,7 @@
 use super::kernels::Scalar;
 use super::policy::Policy;
 use super::{LearnError, check_length};
+use crate::schema::OutOfRange;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
@@ -29,11 +30,11 @@ impl<T: Scalar> Batch<'_, T> {
         let samples = self.returns.len();
         // Indices are u32, and an empty batch has no mean.
         if samples == 0 || samples > u32::MAX as usize {
-            return Err(LearnError::Setting {
-                name: "number of samples",
+            return Err(LearnError::Setting(OutOfRange {
+                setting: "number of samples".to_owned(),
                 value: samples.to_string(),
-                range: "1..2^32",
-            });
+                allowed: format!("a whole number from 1 to {}", u32::MAX),
+            }));
         }
         check_length(
             "batch of observations",

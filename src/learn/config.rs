@@ -3,10 +3,11 @@
 use super::LearnError;
 use super::adam::AdamConfig;
 use super::surrogate::Objective;
+use crate::schema::{self, OutOfRange};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How to learn. Left-out fields take the defaults.
+/// How to learn, by proximal policy optimisation. Fields that are left out take the defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PpoConfig {
@@ -115,118 +116,16 @@ impl PpoConfig {
     /// # Errors
     /// The first that isn't.
     pub fn check(&self) -> Result<(), LearnError> {
-        let positive = f64::MIN_POSITIVE..=f64::MAX;
-        let unit = 0.0..=1.0;
-        let least = 0.0..=f64::MAX;
-        let decay = 0.0..=1.0 - f64::EPSILON;
-        let settings = [
-            ("gamma", self.gamma, &unit, "0..=1"),
-            ("lambda", self.lambda, &unit, "0..=1"),
-            ("clip", self.clip, &positive, "the positive numbers"),
-            ("epochs", self.epochs as f64, &(1.0..=1000.0), "1..=1000"),
-            (
-                "minibatch",
-                self.minibatch as f64,
-                &(1.0..=1e9),
-                "1..=1000000000",
-            ),
-            (
-                "value_coefficient",
-                self.value_coefficient,
-                &least,
-                "0 or more",
-            ),
-            (
-                "entropy_coefficient",
-                self.entropy_coefficient,
-                &least,
-                "0 or more",
-            ),
-            (
-                "action_bound_coefficient",
-                self.action_bound_coefficient,
-                &least,
-                "0 or more",
-            ),
-            ("action_bound", self.action_bound, &least, "0 or more"),
-            ("adam.beta1", self.adam.beta1, &decay, "0 up to below 1"),
-            ("adam.beta2", self.adam.beta2, &decay, "0 up to below 1"),
-            (
-                "adam.epsilon",
-                self.adam.epsilon,
-                &positive,
-                "the positive numbers",
-            ),
-            ("shards", self.shards as f64, &(1.0..=1024.0), "1..=1024"),
-            (
-                "max_gradient_norm",
-                self.max_gradient_norm,
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "learning_rate",
-                self.learning_rate,
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "min_learning_rate",
-                self.min_learning_rate,
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "max_learning_rate",
-                self.max_learning_rate,
-                &(self.min_learning_rate..=f64::MAX),
-                "min_learning_rate..",
-            ),
-            (
-                "target_kl",
-                self.target_kl.unwrap_or(1.0),
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "advantage_limit",
-                self.advantage_limit.unwrap_or(1.0),
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "critic_learning_rate",
-                self.critic_learning_rate.unwrap_or(1.0),
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "momentum",
-                self.momentum.unwrap_or(0.0),
-                &decay,
-                "0 up to below 1",
-            ),
-            (
-                "stop_kl_factor",
-                self.stop_kl_factor,
-                &positive,
-                "the positive numbers",
-            ),
-            (
-                "initial_std",
-                self.initial_std,
-                &positive,
-                "the positive numbers",
-            ),
-        ];
-        for (name, value, range, text) in settings {
-            if !range.contains(&value) {
-                return Err(LearnError::Setting {
-                    name,
-                    value: value.to_string(),
-                    range: text,
-                });
-            }
+        schema::check(self, "ppo")?;
+        if self.max_learning_rate < self.min_learning_rate {
+            return Err(LearnError::Setting(OutOfRange {
+                setting: "ppo.max_learning_rate".to_owned(),
+                value: self.max_learning_rate.to_string(),
+                allowed: format!(
+                    "a number of {} or more, which is `ppo.min_learning_rate`",
+                    self.min_learning_rate
+                ),
+            }));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Why learning can't begin or go on.
 
 use crate::explain::{Explain, Explanation, explained};
+use crate::schema::OutOfRange;
 
 /// Why learning can't begin or go on.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,14 +16,7 @@ pub enum LearnError {
         expected: usize,
     },
     /// A setting out of its range.
-    Setting {
-        /// Its path in the settings.
-        name: &'static str,
-        /// What it was set to.
-        value: String,
-        /// What it can be, in words.
-        range: &'static str,
-    },
+    Setting(OutOfRange),
     /// An observation that isn't a number.
     Observation {
         /// Which number of the observation.
@@ -62,10 +56,7 @@ impl Explain for LearnError {
                 "{what} has {found} values where {expected} are needed"
             ))
             .remedy("use files of one and the same run"),
-            Self::Setting { name, value, range } => {
-                Explanation::input(format!("{name} is {value}"))
-                    .remedy(format!("set it to {range}"))
-            }
+            Self::Setting(error) => error.explain(),
             Self::Observation { column } => {
                 Explanation::work(format!("observation {column} is not finite"))
                     .remedy("look for a simulation that diverged or a division by zero")
@@ -89,3 +80,9 @@ impl Explain for LearnError {
 }
 
 explained!(LearnError);
+
+impl From<OutOfRange> for LearnError {
+    fn from(error: OutOfRange) -> Self {
+        Self::Setting(error)
+    }
+}

@@ -3,6 +3,7 @@
 use super::kernels::Scalar;
 use super::network::{Activation, Mlp, Workspace};
 use super::{LearnError, check_length};
+use crate::schema::OutOfRange;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
@@ -72,14 +73,18 @@ impl Policy {
         for &width in widths {
             // Bounds that also keep every later product of sizes far from overflow.
             if !(1..=MAX_WIDTH).contains(&width) {
-                return Err(setting("network width", width, "1..=65536"));
+                return Err(setting(
+                    "network width",
+                    width,
+                    "a whole number from 1 to 65536",
+                ));
             }
         }
         if spec.hidden.len() > MAX_LAYERS {
             return Err(setting(
                 "number of hidden layers",
                 spec.hidden.len(),
-                "0..=16",
+                "a whole number from 0 to 16",
             ));
         }
         let actor = Mlp::new(spec.observation, &spec.hidden, spec.action, spec.activation);
@@ -291,11 +296,11 @@ pub fn fill_normal<T: Scalar>(noise: &mut [T], rng: &mut ChaCha8Rng) {
 }
 
 fn setting(name: &'static str, value: usize, range: &'static str) -> LearnError {
-    LearnError::Setting {
-        name,
+    LearnError::Setting(OutOfRange {
+        setting: name.to_owned(),
         value: value.to_string(),
-        range,
-    }
+        allowed: range.to_owned(),
+    })
 }
 
 fn vector(name: &str, range: Range<usize>) -> NamedTensor {

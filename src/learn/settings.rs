@@ -1,32 +1,44 @@
 //! The settings of a trainer.
 
 use super::{Activation, LearnError, PpoConfig};
+use crate::schema;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// How a trainer learns, whatever the task.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrainerSettings {
-    /// Decides all random numbers.
+    /// Decides all random numbers. On one kind of processor, the same seed gives the same bits.
     pub seed: u64,
-    /// The learner's own settings.
+    /// Settings of proximal policy optimisation, the learner.
     pub ppo: PpoConfig,
-    /// Widths of the hidden layers of actor and critic.
+    /// Widths of the hidden layers of actor and critic, up to 16 of them.
+    #[schemars(inner(range(min = 1, max = 65536)))]
     pub hidden: Vec<usize>,
-    /// What follows every hidden layer.
+    /// Activation after every hidden layer.
     pub activation: Activation,
     /// Environments that act side by side.
+    #[schemars(range(min = 1))]
     pub environments: usize,
-    /// Environments that share a network call and physics steps: a multiple of [`LANES`](crate::sim::LANES) leaves no lane
-    /// idle.
+    /// Environments that share a network call and physics steps. A multiple of 8 leaves no lane idle.
+    #[schemars(range(min = 1))]
     pub group: usize,
-    /// Control steps of each environment in an iteration.
+    /// Control steps of each environment in an iteration, which is one batch.
+    #[schemars(range(min = 1))]
     pub horizon: usize,
-    /// Iterations after which all episodes begin anew.
+    /// Iterations after which all episodes begin anew. No episode is under way then, so that is where a run can be stopped and
+    /// resumed to the same bits.
+    #[schemars(range(min = 1))]
     pub round: u64,
-    /// Samples after which training ends.
+    /// Samples (control steps of one environment) after which training ends.
+    #[schemars(range(min = 1))]
     pub samples: u64,
-    /// Action noise at the end, as a share of that at the start.
+    /// Action noise at the end, as a share of that at the start. It changes evenly over the samples.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub final_std: f64,
-    /// Learning rate at the end, as a share of that at the start, where no KL steers it.
+    /// Learning rate at the end, as a share of that at the start, where `ppo.target_kl` doesn't steer it. It changes evenly over
+    /// the samples.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub final_learning_rate: f64,
 }
 
@@ -36,38 +48,7 @@ impl TrainerSettings {
     /// # Errors
     /// The first that isn't.
     pub fn check(&self) -> Result<(), LearnError> {
-        let least_one = 1.0..=f64::MAX;
-        let ranges = [
-            (
-                "environments",
-                self.environments as f64,
-                &least_one,
-                "1 or more",
-            ),
-            ("group", self.group as f64, &least_one, "1 or more"),
-            ("horizon", self.horizon as f64, &least_one, "1 or more"),
-            (
-                "final_std",
-                self.final_std,
-                &(f64::MIN_POSITIVE..=f64::MAX),
-                "the positive numbers: it is the share of the action noise that is left at the end",
-            ),
-            (
-                "final_learning_rate",
-                self.final_learning_rate,
-                &(0.0..=1.0),
-                "0 to 1: it is the share of the learning rate that is left at the end",
-            ),
-        ];
-        for (name, value, range, text) in ranges {
-            if !range.contains(&value) {
-                return Err(LearnError::Setting {
-                    name,
-                    value: value.to_string(),
-                    range: text,
-                });
-            }
-        }
+        schema::check(self, "")?;
         self.ppo.check()
     }
 }

@@ -77,7 +77,7 @@ impl RunError {
     pub fn is_setting(&self) -> bool {
         match self {
             Self::Task(error) => error.is_setting(),
-            Self::Learn(error) => matches!(error, LearnError::Setting { .. }),
+            Self::Learn(error) => matches!(error, LearnError::Setting(_)),
             _ => false,
         }
     }

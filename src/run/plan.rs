@@ -3,47 +3,56 @@
 use super::error::RunError;
 use crate::learn::{Activation, PpoConfig, TrainerSettings};
 use crate::task::TaskSettings;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::borrow::Cow;
 
 /// Everything that decides what a run learns. The number of threads does not.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Plan {
-    /// Decides all random numbers. On one kind of processor, the same seed gives the same bits.
+    /// See [`TrainerSettings::seed`].
     pub seed: u64,
     /// What is learned.
     pub task: TaskSettings,
-    /// The settings of the learner.
+    /// See [`TrainerSettings::ppo`].
     pub ppo: PpoConfig,
-    /// Widths of the hidden layers of actor and critic, up to 16 of them.
-    #[schemars(inner(range(min = 1, max = 65536)))]
+    /// See [`TrainerSettings::hidden`].
     pub hidden: Vec<usize>,
-    /// Activation after every hidden layer.
+    /// See [`TrainerSettings::activation`].
     pub activation: Activation,
-    /// Environments that act side by side.
-    #[schemars(range(min = 1))]
+    /// See [`TrainerSettings::environments`].
     pub environments: usize,
-    /// Environments that share a network call and physics steps. A multiple of 8 leaves no lane idle.
-    #[schemars(range(min = 1))]
+    /// See [`TrainerSettings::group`].
     pub group: usize,
-    /// Control steps of each environment in an iteration, which is one batch.
-    #[schemars(range(min = 1))]
+    /// See [`TrainerSettings::horizon`].
     pub horizon: usize,
-    /// Iterations after which all episodes begin anew. No episode is under way then, so that is where a run can be stopped and
-    /// resumed to the same bits.
-    #[schemars(range(min = 1))]
+    /// See [`TrainerSettings::round`].
     pub round: u64,
-    /// Samples (control steps of one environment) after which training ends.
-    #[schemars(range(min = 1))]
+    /// See [`TrainerSettings::samples`].
     pub samples: u64,
-    /// Action noise at the end, as a share of that at the start. It changes evenly over the samples.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    /// See [`TrainerSettings::final_std`].
     pub final_std: f64,
-    /// Learning rate at the end, as a share of that at the start, where `ppo.target_kl` doesn't steer it. It changes evenly over
-    /// the samples.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// See [`TrainerSettings::final_learning_rate`].
     pub final_learning_rate: f64,
+}
+
+/// The settings of the trainer, and among them those of the task.
+impl JsonSchema for Plan {
+    fn schema_name() -> Cow<'static, str> {
+        "Plan".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let task = generator.subschema_for::<TaskSettings>();
+        let mut schema = TrainerSettings::json_schema(generator);
+        schema
+            .ensure_object()
+            .entry("properties")
+            .or_insert_with(|| json!({}))["task"] = task.into();
+        schema
+    }
 }
 
 impl Default for Plan {

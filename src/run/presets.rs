@@ -231,60 +231,7 @@ mod tests {
     use crate::skeleton::Skeleton;
     use crate::task::{CharacterModel, size};
     use crate::{import, retarget};
-    use serde_json::Value;
     use std::sync::Arc;
-
-    /// Every value with its path, in the order of the plan.
-    fn flat(plan: &Plan) -> Vec<(String, String)> {
-        fn walk(path: &str, value: &Value, found: &mut Vec<(String, String)>) {
-            let Value::Object(fields) = value else {
-                found.push((path.to_owned(), value.to_string().replace('"', "")));
-                return;
-            };
-            for (name, value) in fields {
-                let path = [path, name].join(".");
-                walk(path.trim_start_matches('.'), value, found);
-            }
-        }
-        // By way of text, where single precision has its shortest digits.
-        let text = serde_json::to_string(plan).expect("a plan can be written");
-        let mut found = Vec::new();
-        let value = serde_json::from_str(&text).expect("and read");
-        walk("", &value, &mut found);
-        found
-    }
-
-    fn table() -> String {
-        let plans = PRESETS.map(|preset| flat(&(preset.plan)()));
-        let mut names: Vec<&String> = plans.iter().flatten().map(|(name, _)| name).collect();
-        names.sort();
-        names.dedup();
-        let mut text = String::from("| setting |");
-        PRESETS
-            .iter()
-            .for_each(|p| text += &format!(" `{}` |", p.name));
-        text += &format!("\n|{}\n", "---|".repeat(PRESETS.len() + 1));
-        for name in names {
-            text += &format!("| `{name}` |");
-            for plan in &plans {
-                let value = plan.iter().find(|(n, _)| n == name);
-                text += &format!(" {} |", value.map_or("", |(_, v)| v));
-            }
-            text += "\n";
-        }
-        text
-    }
-
-    #[test]
-    fn the_documentation_has_every_value() {
-        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/settings.md");
-        let text = std::fs::read_to_string(file).expect("the page is there");
-        let table = table();
-        assert!(
-            text.contains(&table),
-            "docs/settings.md should have\n\n{table}"
-        );
-    }
 
     #[test]
     fn presets_can_be_trained_and_survive_a_file() {

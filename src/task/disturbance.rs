@@ -1,6 +1,5 @@
 //! What disturbs an episode: another weight, another ground, and shoves.
 
-use super::error::TaskError;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -82,29 +81,6 @@ impl Perturbations {
         let off = Self::default();
         self.push_m_s != off.push_m_s || self.mass != off.mass || self.friction != off.friction
     }
-
-    pub(super) fn check(&self) -> Result<(), TaskError> {
-        let ranges = [
-            ("task.perturbations.push_m_s", self.push_m_s, 0.0),
-            (
-                "task.perturbations.push_interval_s",
-                self.push_interval_s,
-                0.05,
-            ),
-            ("task.perturbations.mass", self.mass, 0.05),
-            ("task.perturbations.friction", self.friction, 0.0),
-        ];
-        for (name, [low, high], least) in ranges {
-            if low > high {
-                return Err(TaskError::Order { name, low, high });
-            }
-            let value = if low >= least { high } else { low };
-            if !(low >= least && high <= 100.0) {
-                return Err(TaskError::Range { name, value, least });
-            }
-        }
-        Ok(())
-    }
 }
 
 /// The disturbances of one episode.
@@ -163,6 +139,7 @@ fn within([low, high]: [f32; 2], rng: &mut ChaCha8Rng) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::schema;
 
     #[test]
     fn shoves_come_in_their_ranges_and_from_all_sides() {
@@ -189,15 +166,18 @@ mod tests {
 
     #[test]
     fn ranges_have_an_order_and_bounds() {
-        assert!(Perturbations::usual().check().is_ok() && !Perturbations::default().is_on());
+        let check = |all: &Perturbations| schema::check(all, "task.perturbations");
+        assert!(check(&Perturbations::usual()).is_ok() && !Perturbations::default().is_on());
         for wrong in [[1.1, 0.9], [0.0, 1.0], [f32::NAN, 1.0], [1.0, 1e9]] {
             let all = Perturbations {
                 mass: wrong,
                 ..Perturbations::default()
             };
+            let said = check(&all).map_err(|e| e.setting);
             assert!(
-                all.check()
-                    .is_err_and(|e| e.to_string().contains("task.perturbations.mass"))
+                said.as_ref()
+                    .is_err_and(|e| e.starts_with("task.perturbations.mass")),
+                "{said:?}"
             );
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::explain::{Explain, Explanation, explained};
 use crate::motion::MotionError;
+use crate::schema::OutOfRange;
 use crate::sim::SimError;
 
 /// Why a task can't be set up or do what it is asked for.
@@ -13,38 +14,13 @@ pub enum TaskError {
     /// A motion that can't be used.
     Motion(MotionError),
     /// A setting out of its range.
-    Setting {
-        /// Its path in the task's settings.
-        name: &'static str,
-        /// What it was set to.
-        value: f64,
-        /// What it can be, in words.
-        range: &'static str,
-    },
+    Setting(OutOfRange),
     /// A reward term with a weight that the reward doesn't have.
     NoSuchTerm {
         /// Name of the term.
         term: &'static str,
         /// Name of the kernels.
         kernels: String,
-    },
-    /// A range whose end is below its beginning.
-    Order {
-        /// Its path in the task's settings.
-        name: &'static str,
-        /// Its beginning.
-        low: f32,
-        /// Its end.
-        high: f32,
-    },
-    /// A range that goes too far.
-    Range {
-        /// Its path in the task's settings.
-        name: &'static str,
-        /// The end at fault.
-        value: f32,
-        /// The least that it can be.
-        least: f32,
     },
     /// A character whose size can't be told.
     NoLegs {
@@ -79,19 +55,19 @@ pub enum TaskError {
 impl TaskError {
     /// Whether a setting is at fault.
     pub fn is_setting(&self) -> bool {
-        matches!(
-            self,
-            Self::Setting { .. }
-                | Self::NoSuchTerm { .. }
-                | Self::Order { .. }
-                | Self::Range { .. }
-        )
+        matches!(self, Self::Setting(_) | Self::NoSuchTerm { .. })
     }
 }
 
 impl From<SimError> for TaskError {
     fn from(error: SimError) -> Self {
         Self::Sim(error)
+    }
+}
+
+impl From<OutOfRange> for TaskError {
+    fn from(error: OutOfRange) -> Self {
+        Self::Setting(error)
     }
 }
 
@@ -106,22 +82,11 @@ impl Explain for TaskError {
         match self {
             Self::Sim(error) => error.explain(),
             Self::Motion(error) => error.explain(),
-            Self::Setting { name, value, range } => {
-                Explanation::input(format!("{name} is {value}"))
-                    .remedy(format!("set it to {range}"))
-            }
+            Self::Setting(error) => error.explain(),
             Self::NoSuchTerm { term, kernels } => Explanation::input(format!(
                 "the reward term `{term}` has a weight, but the {kernels} kernels have no such term"
             ))
             .remedy("set its weight to 0"),
-            Self::Order { name, low, high } => {
-                Explanation::input(format!("{name} is [{low}, {high}]"))
-                    .remedy("give [least, most], the smaller number first")
-            }
-            Self::Range { name, value, least } => {
-                Explanation::input(format!("{name} is a range with {value} in it"))
-                    .remedy(format!("give [least, most], both from {least} to 100"))
-            }
             Self::NoLegs { skeleton, leg } => Explanation::input(format!(
                 "skeleton `{skeleton}` is {leg} m tall from hips to sole, so its size can't be judged"
             ))

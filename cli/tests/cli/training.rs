@@ -353,7 +353,9 @@ fn a_wrong_change_names_what_is_near() {
     };
     let wrong = said("task.termination.distance=1");
     assert!(wrong.contains("`task.terminations.distance`"), "{wrong}");
-    assert!(said("ppo.gamma=3").contains("gamma is 3"));
+    assert!(
+        said("ppo.gamma=3").contains("`ppo.gamma`: 3 is not allowed; give a number from 0 to 1")
+    );
     let wrong = said("task.rewards.kernels=deepmimic");
     assert!(wrong.contains("`position`"), "{wrong}");
     assert!(said("task.rewards.kernels=mine").contains("the present one, \"tracking\""));

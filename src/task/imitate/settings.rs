@@ -1,6 +1,7 @@
-//! What a task can be told.
+//! The settings of the imitation task.
 
 use super::reward::{Kernels, TERM_NAMES};
+use crate::schema::{self, OutOfRange};
 use crate::sim::Settings;
 use crate::task::disturbance::Perturbations;
 use crate::task::error::TaskError;
@@ -33,15 +34,6 @@ pub enum Actions {
         #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
         reach: f32,
     },
-}
-
-impl Actions {
-    fn size(&self) -> f64 {
-        match self {
-            Actions::Residual { scale } => f64::from(*scale),
-            Actions::Absolute { reach } | Actions::FromRest { reach } => f64::from(*reach),
-        }
-    }
 }
 
 /// What the policy sees; see [`super::layout`] for the blocks of each.
@@ -125,7 +117,8 @@ impl Rewards {
         ]
     }
 
-    /// A weight for a term that the kernels don't have would only make every reward smaller.
+    /// A weight for a term that the kernels don't have would only make every reward smaller, and rewards are divided by the
+    /// sum of the weights.
     fn check(&self) -> Result<(), TaskError> {
         let weights = self.weights().into_iter().zip(self.kernels.has());
         match TERM_NAMES
@@ -137,7 +130,12 @@ impl Rewards {
                 term,
                 kernels: self.kernels.to_string(),
             }),
-            None => Ok(()),
+            None if self.weights().iter().sum::<f32>() > 0.0 => Ok(()),
+            None => Err(TaskError::Setting(OutOfRange {
+                setting: "task.rewards".to_owned(),
+                value: "a sum of weights of 0".to_owned(),
+                allowed: "at least one weight above 0".to_owned(),
+            })),
         }
     }
 }
@@ -184,7 +182,7 @@ impl Default for Terminations {
     }
 }
 
-/// Everything that a task can be told.
+/// Settings of the imitation of reference motions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImitationSettings {
@@ -203,7 +201,7 @@ pub struct ImitationSettings {
     /// Whether episodes begin at any phase (reference state initialisation) instead of at the first frame alone.
     pub start_anywhere: bool,
     /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
-    /// [`ImitationSettings::start_anywhere`].
+    /// `task.start_anywhere`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub adaptive_starts: f64,
     /// Time from the start of an episode to its first transition into another motion of the run, and from each to the next: the
@@ -240,87 +238,12 @@ impl Default for ImitationSettings {
 }
 
 impl ImitationSettings {
+    /// Checks that all numbers are in their ranges, and that the reward has the terms that are weighted.
+    ///
     /// # Errors
-    /// A number that no task can have.
+    /// The first that isn't.
     pub fn check(&self) -> Result<(), TaskError> {
-        self.rewards.check()?;
-        self.perturbations.check()?;
-        let weights = self.rewards.weights();
-        let least = weights.iter().copied().fold(f32::INFINITY, f32::min);
-        let physics = &self.physics;
-        let positive = f64::MIN_POSITIVE..=1e6;
-        let checks = [
-            ("control_hz", physics.control_hz, 1.0..=1e4, "1 to 10000"),
-            (
-                "steps_per_control",
-                f64::from(physics.steps_per_control),
-                1.0..=1e3,
-                "1 to 1000",
-            ),
-            (
-                "substeps",
-                f64::from(physics.substeps),
-                1.0..=1e3,
-                "1 to 1000",
-            ),
-            ("contact_s", physics.contact_s, 0.0..=1.0, "0 to 1"),
-            ("episode_s", self.episode_s, positive.clone(), "positive"),
-            ("adaptive_starts", self.adaptive_starts, 0.0..=1.0, "0 to 1"),
-            (
-                "the smallest reward weight",
-                f64::from(least),
-                0.0..=f64::MAX,
-                "0 or more",
-            ),
-            (
-                "the sum of the reward weights",
-                f64::from(weights.iter().sum::<f32>()),
-                positive.clone(),
-                "positive",
-            ),
-            (
-                "the distance that ends an episode",
-                f64::from(self.terminations.distance.unwrap_or(1.0)),
-                positive.clone(),
-                "positive",
-            ),
-            (
-                "the reward that ends an episode",
-                f64::from(self.terminations.reward.unwrap_or(0.0)),
-                0.0..=1.0,
-                "0 to 1",
-            ),
-            (
-                "the size of an action",
-                self.actions.size(),
-                positive,
-                "positive",
-            ),
-        ];
-        let [least, most] = self.transitions_s.unwrap_or([1.0, 1.0]);
-        let transitions = [
-            (
-                "the first of transitions_s",
-                least,
-                0.1..=1e6,
-                "0.1 or more",
-            ),
-            (
-                "the second of transitions_s",
-                most,
-                least..=1e6,
-                "no less than the first",
-            ),
-        ];
-        for (name, value, range, text) in checks.into_iter().chain(transitions) {
-            if !range.contains(&value) {
-                return Err(TaskError::Setting {
-                    name,
-                    value,
-                    range: text,
-                });
-            }
-        }
-        Ok(())
+        schema::check(self, "task")?;
+        self.rewards.check()
     }
 }
