@@ -8,7 +8,8 @@ use crate::humanoid::{self, Slot};
 pub(super) const MOST_WEIGHT: f64 = 100.0;
 
 /// Why a clip can't be carried onto a skeleton.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum RetargetError {
     /// No joint map was given, and none can be found.
     NotHumanoid {

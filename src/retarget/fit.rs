@@ -1,5 +1,5 @@
-//! Stage 6, fit: one trajectory of the skeleton is fitted to its goals, with flights that fall and spin freely, inside the
-//! joint limits and above the ground.
+//! Stage 6, fit: fits one trajectory of the skeleton to its goals, with flights that fall and spin freely, inside the joint
+//! limits and above the ground.
 //!
 //! Flights can be recognised only in a trajectory that is nearly right, so the fit goes in steps, each from the result of
 //! the one before. A first fit follows the goals. Then flights are shifted onto their parabolas and turned so that they spin

@@ -1,4 +1,4 @@
-//! Stage 1, input: the clip is checked and made ready, and its joints are mapped to the humanoid's slots.
+//! Stage 1, input: checks the clip, makes sure that it has enough frames, and maps its joints to the humanoid's slots.
 
 mod rate;
 

@@ -1,5 +1,5 @@
-//! Stage 3, placement: goals and source are moved so that the ground is z = 0 and the root starts above the origin, and
-//! limbs are fitted to that ground.
+//! Stage 3, placement: moves goals and source so that the ground is z = 0 and the root starts above the origin, and
+//! places hands and feet on it.
 //!
 //! In this order, for each step needs the one before: a clip that walks on the spot gets its travel back; the ground is
 //! found under the feet; hands go down to it where the source's do; and feet that are high above it hang on the skeleton's

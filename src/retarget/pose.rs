@@ -1,4 +1,4 @@
-//! Stage 2, pose: for every frame, what the source's pose asks of the skeleton.
+//! Stage 2, pose: finds, for every frame, what the source's pose asks of the skeleton.
 //!
 //! The rest poses are aligned once. Then each frame of the source becomes target positions and orientations, and coordinates
 //! that take over the source's orientations as far as the joints can, from which the solver starts. Frames don't depend on

@@ -1,4 +1,4 @@
-//! Stage 7, result: the motion of the fitted coordinates, and a report that measures it against the source.
+//! Stage 7, result: makes the motion of the fitted coordinates, and a report that measures it against the source.
 
 mod source_rig;
 

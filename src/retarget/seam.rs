@@ -1,4 +1,4 @@
-//! Stage 4, seam: the loop of a clip that repeats is closed, for few clips' loops close exactly.
+//! Stage 4, seam: closes the loop of a clip that repeats, for few clips' loops close exactly.
 //!
 //! First the cycle is found: the turn and the shift that lead from the first frame to the last. What is left between the
 //! last frame and the first one carried on by the cycle is a gap. Half of it is faded into the frames after the seam, half

@@ -1,5 +1,5 @@
-//! Stage 5, stance: when points of feet and hands stand on the ground, and where, and the goals of feet and hands moved
-//! along.
+//! Stage 5, stance: finds which points of feet and hands stand on the ground, when and where, and moves the goals of feet and
+//! hands along.
 //!
 //! Feet stand where they are low and slow themselves, hands where the source's do. A point that stands becomes an [`Anchor`]
 //! in each frame of its stance, at one place on the ground. The limb's targets are moved so that its standing points are
@@ -45,7 +45,7 @@ pub(super) fn plant(
         let limb = Limb {
             effector,
             paths: paths.iter().map(|path| timeline.extend(path)).collect(),
-            touches: believed(contacts, effector, seam).map(|flags| timeline.repeat(&flags)),
+            touches: trusted(contacts, effector, seam).map(|flags| timeline.repeat(&flags)),
         };
         let held = held::held(model, &limb, setting);
         // From the points that stand to how the whole limb moves, and back to the frames of the goals.
@@ -66,13 +66,13 @@ pub(super) fn plant(
 
 /// The source's contact of a limb as far as it decides when the limb stands, by frame: a hand's everywhere; a foot's only
 /// where closing a seam moved the foot so far that its own speed means nothing.
-fn believed(
+fn trusted(
     contacts: &[SourceContact],
     effector: &EndEffector,
     seam: Option<&Seam>,
 ) -> Option<Vec<bool>> {
     let contact = contacts.iter().find(|c| c.slot == effector.slot)?;
     let hidden = |f: usize| seam.is_some_and(|seam| seam.hides_stance(effector.keypoint, f));
-    let believed = |(f, touches): (usize, &bool)| *touches && (!effector.is_foot || hidden(f));
-    Some(contact.touches.iter().enumerate().map(believed).collect())
+    let trusts = |(f, touches): (usize, &bool)| *touches && (!effector.is_foot || hidden(f));
+    Some(contact.touches.iter().enumerate().map(trusts).collect())
 }

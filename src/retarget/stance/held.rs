@@ -24,7 +24,7 @@ pub(super) struct Limb<'a> {
     pub effector: &'a EndEffector,
     /// `paths[p][f]`: centre of its contact point `p`, world, metres.
     pub paths: Vec<Vec<Vector3<f64>>>,
-    /// Whether the source's limb stands, where that is to be believed.
+    /// Whether the source's limb stands, where that is to be trusted.
     pub touches: Option<Vec<bool>>,
 }
 
@@ -95,7 +95,7 @@ impl Limb<'_> {
         self.paths[k][f].z - model.contact_points[self.effector.points[k]].radius
     }
 
-    /// Whether the source's limb stands, where that is to be believed.
+    /// Whether the source's limb stands, where that is to be trusted.
     fn touches(&self, f: usize) -> bool {
         self.touches.as_ref().is_some_and(|touches| touches[f])
     }

@@ -1,3 +1,5 @@
+//! Retargeting, on rigs that are built by hand and on clips that people recorded.
+
 mod jumps;
 mod recorded;
 mod trimmed;

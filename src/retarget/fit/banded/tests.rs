@@ -1,3 +1,5 @@
+//! The banded solver beside a dense one.
+
 use super::*;
 use nalgebra::{DMatrix, DVector};
 

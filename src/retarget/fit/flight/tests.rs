@@ -1,3 +1,5 @@
+//! Flights of jumps that are built by hand.
+
 use super::super::ballistic::problem;
 use super::*;
 use crate::motion::Cycle;

@@ -1,3 +1,5 @@
+//! Spins of bodies that are moved by hand.
+
 use super::super::flight::find;
 use super::super::torque_free::step;
 use super::*;
