@@ -11,11 +11,13 @@ pub(crate) fn carry(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Isometry3<f64> {
     let (from, to) = (centre(a), centre(b));
     let (mut cross, mut dot) = (0.0, 0.0);
     for (a, b) in a.iter().zip(b) {
+        // Centred, so that the turn doesn't depend on where the origin is.
         let (a, b) = (a.xy() - from, b.xy() - to);
         cross += a.perp(&b);
         dot += a.dot(&b);
     }
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), f64::atan2(cross, dot));
+    // The centres meet.
     let shift = to.push(0.0) - turn * from.push(0.0);
     Isometry3::from_parts(shift.into(), turn)
 }

@@ -70,6 +70,7 @@ impl Clip {
             let first = here[0].translation.vector;
             (at.translation.vector - first).norm()
         };
+        // The figure's size in the pose at the end.
         let size = here.iter().map(from_first).fold(0.0, f64::max);
         let goes_on = |frame: &&Vec<Isometry3<f64>>| {
             if frame.len() != self.joints.len() {
@@ -80,6 +81,7 @@ impl Clip {
                 (a.translation.vector - b.translation.vector).norm_squared()
             };
             let sum: f64 = here.iter().zip(&next).map(step).sum();
+            // Root mean square speed of all joints from one frame to the next.
             let speed = (sum / next.len().max(1) as f64).sqrt() * self.fps;
             here = next;
             speed < CUT * size

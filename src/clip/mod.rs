@@ -3,6 +3,7 @@
 mod carry;
 pub mod edit;
 mod error;
+mod extent;
 mod file;
 mod margin;
 mod problem;
@@ -13,6 +14,7 @@ mod tests;
 
 pub(crate) use carry::carry;
 pub use error::Error;
+pub(crate) use extent::extent;
 pub use margin::Margin;
 pub use problem::{Problem, Severity};
 pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};

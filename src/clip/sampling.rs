@@ -54,8 +54,10 @@ fn way(now: Vector3<f64>, [start, end]: [Vector3<f64>; 2], t: f64) -> Vector3<f6
 /// derivatives", 1995).
 fn turn(now: &UnitQuaternion<f64>, slopes: [Vector3<f64>; 2], t: f64) -> UnitQuaternion<f64> {
     let [start, end] = slopes.map(|slope| UnitQuaternion::from_scaled_axis(slope / 3.0));
+    // The three factors make the whole turn at the end of the step: start · middle · end = now.
     let middle = start.inverse() * now * end.inverse();
     let u = 1.0 - t;
+    // Cumulative Bernstein polynomials of degree 3.
     let shares = [1.0 - u * u * u, t * t * (3.0 - 2.0 * t), t * t * t];
     start.powf(shares[0]) * middle.powf(shares[1]) * end.powf(shares[2])
 }
@@ -83,6 +85,7 @@ impl Grid {
         if !(fps > 0.0 && fps <= MOST_FPS && duration >= 0.0) {
             return None;
         }
+        // Intervals as the rate asks, at least one, but none shorter than the highest rate has.
         let fit = (duration * MOST_FPS).floor();
         let intervals = (duration * fps).round().max(1.0).min(fit);
         if intervals >= most as f64 {
@@ -93,6 +96,7 @@ impl Grid {
         } else {
             (0.0, fps)
         };
+        // The exact rate asked for, where the difference is only rounding.
         let fps = if (even - fps).abs() <= SAME_RATE * fps {
             fps
         } else {
@@ -159,6 +163,7 @@ impl Clip {
             now.0,
             in_place(out, frame + 2 <= last).map(|s| s.0),
         );
+        // A turn near half a revolution has no clear direction, and nor has its slope.
         let wild = [into, Some(now), out].into_iter().flatten();
         let turning = if wild.map(|s| s.1.norm()).any(|angle| angle > WILD) {
             [now.1; 2]
@@ -207,6 +212,7 @@ impl Clip {
         let duration = self.duration();
         let end = to.min(duration);
         let start = from.max(0.0);
+        // Written so that it also refuses numbers that are not a number.
         if !(from <= to && start <= end) {
             return Err(Error::EmptyTrim {
                 from,

@@ -72,7 +72,7 @@ impl Explain for Error {
     fn explain(&self) -> Explanation {
         match self {
             Self::TooFewJoints { joints } => Explanation::input(format!(
-                "{joints} joints are too few for a humanoid, which needs at least {}",
+                "a humanoid has at least {} joints, and this figure has {joints}",
                 Slot::REQUIRED.len()
             ))
             .remedy("choose a figure with arms and legs"),

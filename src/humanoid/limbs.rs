@@ -79,6 +79,7 @@ fn candidates(labels: &[Label], part: Part, side: Side) -> Vec<Candidate> {
     let mut fitting: Vec<Candidate> = labels.iter().enumerate().map(fits).collect();
     fitting.retain(|(_, score)| *score > 0.0);
     fitting.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    // Sorted by score first, so only the worst are dropped.
     fitting.truncate(CANDIDATES);
     fitting
 }
@@ -118,6 +119,7 @@ impl Limb {
         }
         if let (Some((part, slot)), Some(end)) = (self.beyond, end) {
             let below = candidates(labels, part, self.side);
+            // Toes with the foot's own name would be a second part of the foot.
             let is_next =
                 |c: &Candidate| tree.is_above(end, c.0) && joints[c.0].name != joints[end].name;
             if let Some((j, score)) = below.into_iter().find(is_next) {
@@ -147,6 +149,7 @@ impl Limb {
         for root in &roots {
             for bend in bends.iter().filter(|b| tree.is_above(root.0, b.0)) {
                 let end = end_of(tree, &ends, root.0, bend.0, self.beyond.is_some());
+                // The chain with the best names in total; of equals the first, unless another root is nearer to the bend.
                 let sum = root.1 + bend.1 + end.map_or(0.0, |e| e.1);
                 let wins = best.is_none_or(|(most, chain)| {
                     let equal = (sum - most).abs() <= 1e-9;
@@ -198,6 +201,7 @@ fn end_of(
     bend: usize,
     may_stand_apart: bool,
 ) -> Option<Link> {
+    // An end in the chain is preferred to one outside.
     let below = ends.iter().find(|e| tree.is_above(bend, e.0));
     let apart = ends.iter().find(|e| {
         may_stand_apart && e.1 > APART && e.0 != root && e.0 != bend && !tree.is_above(root, e.0)

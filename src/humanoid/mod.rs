@@ -200,6 +200,7 @@ pub fn partial(joints: &[Joint]) -> HumanoidMap {
 fn guesses(tree: &tree::Tree, joints: &[Joint]) -> HumanoidMap {
     let labels: Vec<names::Label> = joints.iter().map(|j| names::Label::new(&j.name)).collect();
     let mut found = HumanoidMap::default();
+    // Each step relies on the slots that the one before has filled.
     limbs::find(tree, joints, &labels, &mut found);
     shape::complete(tree, &labels, &mut found);
     trunk::find(tree, joints, &labels, &mut found);

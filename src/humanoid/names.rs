@@ -185,9 +185,11 @@ impl Label {
         let mut side = None;
         let mut core = String::new();
         for word in words(local) {
+            // A word may be a side, have one in front or behind, or have none.
             let (found, rest) = split_side(&word);
             match (side, found) {
                 (None, Some(found)) => side = Some(found),
+                // A name with both sides belongs to neither.
                 (Some(one), Some(other)) if one != other => return Label::foreign(),
                 _ => {}
             }
@@ -253,6 +255,7 @@ fn humps(name: &str) -> Vec<String> {
     for (i, c) in letters.iter().enumerate() {
         let before = i.checked_sub(1).map(|k| letters[k]);
         let after = letters.get(i + 1);
+        // A new word begins at a capital after a small letter, and at the last of several capitals before one.
         let starts = c.is_uppercase()
             && (before.is_some_and(char::is_lowercase)
                 || (before.is_some_and(char::is_uppercase)

@@ -61,6 +61,7 @@ pub(super) fn complete(tree: &Tree, labels: &[Label], found: &mut HumanoidMap) {
     for limb in limbs {
         fill_gaps(tree, &reach, found, [limb[0], limb[1], limb[2]]);
     }
+    // A limb needs its first three joints; a clavicle or toes may be missing.
     let lacks =
         |found: &HumanoidMap, slots: &[Slot]| slots.iter().any(|s| found.joint(*s).is_none());
     if (lacks(found, &LEFT_LEG[..3]) || lacks(found, &RIGHT_LEG[..3]))
@@ -90,6 +91,7 @@ fn fill_gaps(
     let [root, bend, end] = slots.map(|slot| found.joint(slot));
     let (slot, joint, reason) = match (root, bend, end) {
         (Some(root), None, Some(end)) => {
+            // Upper and lower bone are about equally long, so the bend is nearest to the middle.
             let uneven = |j: &usize| (length(root, *j) - length(*j, end)).abs();
             let between = tree.path(root, end).into_iter().skip(1);
             let middle = between
@@ -103,6 +105,7 @@ fn fill_gaps(
             (slots[0], above, "the joint above its limb's bend")
         }
         (_, Some(bend), None) => {
+            // One child can only be the end; of several, the one that leads farthest down.
             let only = match tree.children[bend][..] {
                 [only] => Some(only),
                 _ => reach[bend].0.filter(|_| root.is_some()),
@@ -133,6 +136,7 @@ fn supplement(
         })
         .collect();
     let links: Vec<usize> = merged.iter().filter_map(|link| link.1).collect();
+    // Named and found joints must be one chain.
     let fits = links.windows(2).all(|pair| tree.is_above(pair[0], pair[1]));
     for (i, (slot, joint, named)) in merged.into_iter().enumerate() {
         let joint = if fits { joint } else { joints[i] };
@@ -149,6 +153,7 @@ fn supplement(
 /// For every joint, the child on its longest way down, and that way's length.
 fn reaches(tree: &Tree) -> Vec<(Option<usize>, f64)> {
     let mut reach: Vec<(Option<usize>, f64)> = vec![(None, 0.0); tree.at.len()];
+    // Children come after their parents, so backwards every child is done before its parent.
     for j in (0..tree.at.len()).rev() {
         for &child in &tree.children[j] {
             let length = reach[child].1 + tree.span(j, child).norm();
@@ -216,6 +221,7 @@ fn legs(
 ) -> Option<[[Option<usize>; 4]; 2]> {
     let mut best: Option<(f64, [[usize; 3]; 2], [Branch; 2])> = None;
     for pair in pairs(tree, reach, 3) {
+        // Feet are the lowest ends of a figure that stands.
         let low = end(tree, &pair[0]).z + end(tree, &pair[1]).z;
         if best.as_ref().is_none_or(|(lowest, ..)| low < *lowest)
             && let (Some(a), Some(b)) = (leg_joints(tree, &pair[0]), leg_joints(tree, &pair[1]))
@@ -258,6 +264,7 @@ fn leg_joints(tree: &Tree, branch: &Branch) -> Option<[usize; 3]> {
     for (i, &hip) in joints.iter().enumerate() {
         for (k, &knee) in joints.iter().enumerate().skip(i + 1) {
             for (a, &ankle) in joints.iter().enumerate().skip(k + 1) {
+                // 1 − cosine of the angle between shin and foot: 0 in a straight chain, 1 at a right angle.
                 let turn = joints.get(a + 1).map_or(0.0, |next| {
                     let (shin, foot) = (tree.span(knee, ankle), tree.span(ankle, *next));
                     1.0 - shin.dot(&foot) / (shin.norm() * foot.norm()).max(1e-12)
@@ -280,6 +287,7 @@ fn named_first(labels: &[Label], pair: &[Branch; 2]) -> Option<bool> {
             .joints
             .iter()
             .filter(|j| !labels[**j].core.is_empty());
+        // Joints vote for a side.
         let names = named.filter_map(|j| labels[*j].side);
         names.fold(0, |sum, side| sum + if side == Side::Left { 1 } else { -1 })
     };
@@ -317,6 +325,7 @@ fn arms(
     let side = apart([Slot::LeftUpperLeg, Slot::RightUpperLeg])
         + apart([Slot::LeftLowerLeg, Slot::RightLowerLeg])
         + apart([Slot::LeftFoot, Slot::RightFoot]);
+    // A leg, its parts, and everything above it: arms are none of these.
     let in_leg = |j: usize| {
         [left, right]
             .iter()
@@ -344,6 +353,7 @@ fn arms(
 /// `inside` may begin with a clavicle: a bone shorter than 0.7 of the next one. Chosen.
 fn arm_joints(tree: &Tree, branch: &Branch, inside: bool) -> [Option<usize>; 4] {
     let joints = &branch.joints;
+    // A joint with several children ends the arm: it is the hand.
     let fingers = joints
         .iter()
         .skip(2)

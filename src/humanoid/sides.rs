@@ -25,6 +25,7 @@ pub fn pairs(joints: &[Joint], map: &HumanoidMap) -> Vec<(usize, usize)> {
         .filter(|(left, right)| left != right)
         .collect();
     let mut paired = vec![false; joints.len()];
+    // Joints in the middle of the body have no partner, whatever their names.
     let centre = map.matches.iter().filter(|(slot, _)| slot.is_central());
     let placed = centre.map(|(_, found)| found.joint);
     for joint in placed.chain(pairs.iter().flat_map(|&(left, right)| [left, right])) {
@@ -35,6 +36,7 @@ pub fn pairs(joints: &[Joint], map: &HumanoidMap) -> Vec<(usize, usize)> {
     let names = unique(joints, |joint| Some(&joint.name));
     let bones = unique(joints, |joint| joint.bone.as_deref());
     for (left, joint) in joints.iter().enumerate() {
+        // What the file says goes before the name.
         let bone = joint.bone.iter().flat_map(|bone| mirrored_names(bone));
         let bone = bone.map(|bone| bones.get(bone.as_str()));
         let name = mirrored_names(&joint.name).into_iter();

@@ -20,6 +20,7 @@ pub(super) fn find(tree: &Tree, joints: &[Joint], labels: &[Label], found: &mut 
     let Some(legs_meet) = tree.meet(left, right) else {
         return;
     };
+    // Hips first: chest and neck are found from there.
     let hips = hips(tree, labels, legs_meet, [left, right]);
     let reason = if hips == legs_meet {
         "both legs branch off from it".to_owned()
@@ -61,9 +62,11 @@ fn chest(
     let left = arm(Slot::LeftShoulder, Slot::LeftUpperArm)?;
     let right = arm(Slot::RightShoulder, Slot::RightUpperArm)?;
     let meet = tree.meet(left, right)?;
+    // Arms that meet at the hips or below share no trunk joint of their own.
     if meet != hips && !tree.is_above(meet, hips) {
         return Some((meet, 1.0, "both arms branch off from it".to_owned()));
     }
+    // Then the topmost joint that is named for the trunk, unless it is above the hips in the tree.
     let is_trunk = |j: &usize| *j != hips && labels[*j].fits(Part::Trunk, None) > 0.0;
     let last = (0..joints.len())
         .filter(|j| is_trunk(j) && !tree.is_above(*j, hips))
@@ -125,6 +128,7 @@ fn by_place(tree: &Tree, labels: &[Label], found: &mut HumanoidMap, chest: usize
             .flatten()
             .any(|a| *a == j || tree.is_above(j, *a))
     };
+    // A neck goes up; capes and holsters hang down.
     let above = |j: &&usize| !holds_arm(**j) && tree.span(chest, **j).z > 0.0;
     let Some(&first) = tree.children[chest].iter().find(above) else {
         return;

@@ -40,6 +40,7 @@ pub(crate) fn pose(
     stand: &Stand<'_>,
     skins: impl Iterator<Item = Binds>,
 ) -> Option<(Vec<Matrix4<f64>>, Problem)> {
+    // Bind transforms in the parents, of all skins: where skins share a joint, the first one counts.
     let ends = ends(stand.nodes);
     let mut bound: Vec<Option<Matrix4<f64>>> = vec![None; stand.nodes.len()];
     for (node, local) in skins.flat_map(|binds| locals(stand, &ends, binds)) {
@@ -51,6 +52,7 @@ pub(crate) fn pose(
         let turn = Turn::between(bound.as_ref()?, &stand.local(node)?)?;
         Some(turn.angle > SAME)
     };
+    // If no bone is turned away from its bind pose, the nodes are in the rest pose already.
     let mut posed = bound.iter().enumerate().map(posed);
     let problem = posed.any(|posed| posed == Some(true)).then(note)?;
     Some((composed(stand, &bound), problem))
@@ -98,6 +100,7 @@ fn locals(stand: &Stand<'_>, ends: &[usize], mut binds: Binds) -> Binds {
     binds.retain(|(node, bind)| *node < ends.len() && bind.iter().all(|x| x.is_finite()));
     binds.sort_by_key(|&(node, _)| node);
     binds.dedup_by_key(|&mut (node, _)| node);
+    // Positions agree, so different rotations are only different joint axes.
     if stand.is_in(&binds) {
         return Vec::new();
     }
@@ -138,6 +141,7 @@ impl Stand<'_> {
             cross += up.dot(&a.cross(b));
             dot += a.dot(b) - a.dot(&up) * b.dot(&up);
         }
+        // Rotate the nodes to the heading of the bind pose, and compare what is left with the size of the figure.
         let turn = Rotation3::from_scaled_axis(up * cross.atan2(dot));
         let off = stands
             .iter()
@@ -169,6 +173,7 @@ impl Stand<'_> {
         let agrees = |world: Matrix4<f64>| {
             let local = from_parent * self.with_heading(node, world);
             let turn = Turn::between(&local, &rest)?;
+            // A bind pose in other units or axes than the node's says nothing about its pose.
             let sized = turn.ratio < SCALED && turn.ratio > 1.0 / SCALED;
             (sized && turn.angle < POSED).then_some((turn.angle, local))
         };

@@ -58,6 +58,7 @@ impl<'a> Rig<'a> {
             other_up: None,
             problems,
         };
+        // First the rest pose, then which way is up in it, then which way it faces: each step needs the one before.
         let rest = rig.usable_rest(first)?;
         rig.joints = rig.rest_joints(rest)?;
         if !frame.is_sure {
@@ -78,6 +79,7 @@ impl<'a> Rig<'a> {
         let mut world: Vec<Isometry3<f64>> = Vec::with_capacity(self.nodes.len());
         for (j, &node) in self.nodes.iter().enumerate() {
             let parent = self.parents[j].map(|p| world[p].rotation);
+            // A joint scaled to nothing has no rotation: it keeps its last one, or its parent's.
             let otherwise = before
                 .map(|frame| frame[j].rotation)
                 .or(parent)
@@ -116,6 +118,7 @@ impl<'a> Rig<'a> {
         first: Option<(usize, f64)>,
     ) -> Result<Option<(usize, f64)>, ErrorKind> {
         let Some(first) = first else { return Ok(None) };
+        // A rest pose that isn't finite counts as collapsed: the first frame may be sound.
         let rest = self.world(None, None).map_or(0.0, |rest| span(&rest));
         if self.nodes.len() < 2 || rest > COLLAPSED * span(&self.world(Some(first), None)?) {
             return Ok(None);
@@ -158,6 +161,7 @@ impl<'a> Rig<'a> {
             .collect();
         let up = stature.other_up(&self.world(rest, None)?, &motion, &self.frame.axes);
         if let Some(up) = up {
+            // New axes change every rest transform.
             self.frame.axes = up.canonical_from_file();
             self.joints = self.rest_joints(rest)?;
             self.problems
@@ -174,6 +178,7 @@ impl<'a> Rig<'a> {
         if turn == 0.0 {
             return Ok(());
         }
+        // The turn comes after the change of axes, so it multiplies from the left.
         self.frame.axes = facing::about_z(turn) * self.frame.axes;
         self.joints = self.rest_joints(rest)?;
         self.problems.push(Problem::note(

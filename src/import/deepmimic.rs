@@ -1,6 +1,7 @@
 //! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one humanoid that isn't in the file (Peng et al.,
 //! "DeepMimic", 2018).
 
+use super::measure::whole_rate;
 use super::scene::{Contents, Node, Scene, Take, composed};
 use crate::clip::{MOST_FPS, Problem, slerp};
 use crate::explain::{Explain, Explanation, explained};
@@ -227,6 +228,7 @@ fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
     if !row.iter().all(|x| x.abs() < 1e9) {
         return Err(DeepMimicError::Magnitude { frame });
     }
+    // After the duration and the root's position.
     let mut at = 4;
     let mut rotations = Vec::with_capacity(JOINTS.len());
     for definition in &JOINTS {
@@ -256,27 +258,22 @@ fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
     })
 }
 
-/// Frames per second, Hz, by the median of the frames' durations: the whole number within 0.1 % of it, if there is one, because
-/// the files write 1/30 s as 0.033332. Within what can be sampled. A single frame has 30, the rate of the format's files.
+/// Frames per second, Hz, by the median of the frames' durations, within what can be sampled. A single frame has 30, the rate of
+/// the format's files.
 fn rate(poses: &[Pose]) -> f64 {
     let mut gaps: Vec<f64> = poses.windows(2).map(|w| w[1].time - w[0].time).collect();
     gaps.sort_by(f64::total_cmp);
     let Some(&gap) = gaps.get(gaps.len() / 2) else {
         return 30.0;
     };
-    let rate = (1.0 / gap).clamp(1.0, MOST_FPS);
-    let whole = rate.round();
-    if (rate - whole).abs() < 1e-3 * whole {
-        whole
-    } else {
-        rate
-    }
+    whole_rate((1.0 / gap).clamp(1.0, MOST_FPS))
 }
 
 impl DeepMimicScene {
     /// Root position and joint rotations at `time` seconds: linear between the two frames around it, and rotations along the
     /// shortest arc.
     fn pose_at(&self, time: f64) -> (Vector3<f64>, Vec<UnitQuaternion<f64>>) {
+        // The frames before and after this time; outside the motion, the first or last one twice.
         let after = self.poses.partition_point(|pose| pose.time <= time);
         let b = &self.poses[after.min(self.poses.len() - 1)];
         let a = &self.poses[after.saturating_sub(1)];

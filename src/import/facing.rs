@@ -1,7 +1,8 @@
 //! Which way a character faces at rest, and the turn about Z that makes it face +X.
 
+use super::figure;
 use crate::clip::Joint;
-use crate::humanoid::{self, HumanoidMap, Slot};
+use crate::humanoid::{HumanoidMap, Slot};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -13,19 +14,14 @@ const SNAP: f64 = 15.0 * PI / 180.0;
 /// Left and right places of paired joints (hips, shoulders), in canonical axes.
 pub(crate) type Pair = (Vector3<f64>, Vector3<f64>);
 
-/// No humanoid is looked for among more joints than this. Chosen: the search would take long, and no rig of one has as many.
-const MOST_JOINTS: usize = 4096;
-
 /// Positions at rest of a humanoid's hips and shoulders; in other figures, of all joints whose names differ only in the side.
 ///
 /// `world` has the world transform of every joint in `joints`.
 pub(crate) fn pairs(joints: &[Joint], world: &[Isometry3<f64>]) -> Vec<Pair> {
-    if joints.len() <= MOST_JOINTS
-        && let Ok(map) = humanoid::map(joints)
-    {
-        return limbs(&map, world);
+    match figure::humanoid(joints) {
+        Some(map) => limbs(&map, world),
+        None => named_pairs(joints, world),
     }
-    named_pairs(joints, world)
 }
 
 fn limbs(map: &HumanoidMap, world: &[Isometry3<f64>]) -> Vec<Pair> {
@@ -85,10 +81,13 @@ fn sideless(name: &str, word: &str, letter: &str) -> Option<String> {
 /// Forward is (left − right) × up: with left along +Y and up along +Z it is +X. Pairs tell if they are less than 60° from
 /// the horizontal on the whole (its cosine is 0.5). Chosen.
 pub(crate) fn turn_to_forward(pairs: &[Pair]) -> Option<f64> {
+    // The sum over all pairs lets hips and shoulders outvote a twisted trunk.
     let across: Vector3<f64> = pairs.iter().map(|(left, right)| left - right).sum();
     let forward = across.cross(&Vector3::z());
+    // A figure that lies on its side has left above right, which says nothing about its heading.
     let tells = forward.norm() > 0.5 * across.norm();
     let turn = -forward.y.atan2(forward.x);
+    // Within the tolerance, a quarter turn exactly: the file's axes then stay aligned with ours, to the bit.
     let snapped = (turn / FRAC_PI_2).round() * FRAC_PI_2;
     let turn = if (turn - snapped).abs() < SNAP {
         snapped
@@ -101,6 +100,7 @@ pub(crate) fn turn_to_forward(pairs: &[Pair]) -> Option<f64> {
 /// Rotation about +Z by `turn` radians, exact for quarter turns: sin and cos of multiples of π/2 have rounding errors.
 pub(crate) fn about_z(turn: f64) -> Matrix3<f64> {
     let quarters = turn / FRAC_PI_2;
+    // Quarter turns by whole numbers, everything else by sine and cosine.
     let (sin, cos) = match quarters.round() as i64 {
         _ if (quarters - quarters.round()).abs() > 1e-9 => turn.sin_cos(),
         1 => (1.0, 0.0),

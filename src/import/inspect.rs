@@ -43,6 +43,7 @@ pub struct Inspection {
 
 pub(super) fn inspection(scene: &dyn Scene) -> Result<Inspection, ErrorKind> {
     let default_take = (!scene.takes().is_empty()).then(|| take::most_motion(scene));
+    // The same rest pose as the clip of the default take will have.
     let first = default_take.map(|take| (take, scene.takes()[take].start));
     let rig = Rig::new(scene, frame(scene, &Options::default())?, first)?;
     let mut problems = scene.contents().problems.clone();

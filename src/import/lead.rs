@@ -19,6 +19,7 @@ pub(super) fn is_apart(world: &[Vec<Isometry3<f64>>]) -> bool {
         return false;
     }
     let places = moving_places(world);
+    // Step lengths, root mean square over the joints that move.
     let mut steps = places.windows(2).map(|w| rms(&difference(&w[0], &w[1])));
     let first = steps.next().unwrap_or(0.0);
     let longest = steps.fold(0.0, f64::max);

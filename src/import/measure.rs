@@ -1,6 +1,6 @@
 //! Guesses for formats that state no unit of length, or round their frame rate.
 
-use crate::clip::Problem;
+use crate::clip::{Problem, extent};
 use nalgebra::Vector3;
 
 /// Frames per second of a frame time, `seconds`, that is written as `text`. `None` outside 1 to 10,000 Hz.
@@ -14,6 +14,7 @@ pub(crate) fn rate_of_frame_time(text: &str, seconds: f64) -> Option<f64> {
     if !(1.0..=10_000.0).contains(&rate) {
         return None;
     }
+    // How many digits are written after the point, and so how much the last one is worth.
     let digits = text.split(['e', 'E']).next()?;
     let digits = digits.split(['.', ',']).nth(1).map_or(0, str::len);
     let unit = 10f64.powi(-(digits.min(300) as i32));
@@ -21,6 +22,28 @@ pub(crate) fn rate_of_frame_time(text: &str, seconds: f64) -> Option<f64> {
     let beyond = (1.0 / rate.round() - seconds) / unit;
     let means_whole = unit <= 0.04 * seconds && (-0.500001..=1.000001).contains(&beyond);
     Some(if means_whole { rate.round() } else { rate })
+}
+
+/// The whole number within 0.1 % of a rate, if there is one, else the rate itself: writers round times to ticks, milliseconds or
+/// six digits (1/30 s as 0.033332).
+pub(crate) fn whole_rate(rate: f64) -> f64 {
+    let whole = rate.round();
+    if (rate - whole).abs() < 1e-3 * whole {
+        whole
+    } else {
+        rate
+    }
+}
+
+/// World positions at rest, in the file's units, of joints that don't turn there: parent and offset of each, parents first.
+pub(crate) fn rest(
+    joints: impl Iterator<Item = (Option<usize>, Vector3<f64>)>,
+) -> Vec<Vector3<f64>> {
+    let mut places: Vec<Vector3<f64>> = Vec::new();
+    for (parent, offset) in joints {
+        places.push(parent.map_or(offset, |p| places[p] + offset));
+    }
+    places
 }
 
 /// The unit of a file that doesn't state one.
@@ -51,12 +74,8 @@ impl Scale {
 
     /// The unit in which the longest side of the box around the joints at rest is nearest to a person's height, as a ratio.
     pub fn guess(rest: &[Vector3<f64>]) -> Self {
-        let side = |axis: usize| {
-            let along = rest.iter().map(|place| place[axis]);
-            let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-            (high - low).max(0.0)
-        };
-        let size = (0..3).map(side).fold(0.0, f64::max);
+        let size = extent(rest.iter().copied());
+        // Ratios are compared on a logarithmic scale: half as tall is as far off as twice as tall.
         let off = |unit: f64| (size * unit / Self::PERSON_M).ln().abs();
         let nearest = Self::UNITS
             .iter()
@@ -89,6 +108,7 @@ impl Scale {
 pub(crate) fn unit(stated: Option<f64>, rest: &[Vector3<f64>]) -> (f64, Option<Problem>) {
     let scale = Scale::guess(rest);
     match stated {
+        // A stated unit is believed as long as a person could have the size that it gives.
         Some(unit_m) if scale.allows(unit_m) => (unit_m, None),
         Some(unit_m) => {
             let tall = scale.size * unit_m;

@@ -1,7 +1,8 @@
 //! Bytes of an animation file become a [`Clip`].
 //!
-//! A reader per format turns bytes into a scene: its nodes, its takes, and where every node is at any time. Everything after that is common to all formats: the choice of
-//! the take and of the joints, canonical axes and metres, rigid transforms, sampling, and the detection of loops.
+//! A reader per format turns bytes into a scene: its nodes, its takes, and where every node is at any time. Everything after
+//! that is common to all formats: the choice of the take and of the joints, canonical axes and metres, rigid transforms,
+//! sampling, and the detection of loops.
 //!
 //! Positions are facts and everything else in a file is a claim: where rest pose, unit, up axis or heading disagree with
 //! the motion, the motion counts and a [`Problem`](crate::clip::Problem) says so.
@@ -16,6 +17,7 @@ mod detect;
 mod error;
 mod facing;
 mod fbx;
+mod figure;
 mod gltf;
 mod inspect;
 mod lead;
@@ -121,6 +123,7 @@ fn clip(
         .map(|b| format!("{b:02x}"))
         .collect();
     clip.problems.extend(note);
+    // Last, so that a clip is the same straight from here and from its file.
     clip.round_to_file();
     Ok(clip)
 }

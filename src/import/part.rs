@@ -35,12 +35,14 @@ impl Part {
         fps: f64,
         most: usize,
     ) -> Result<Part, ErrorKind> {
+        // The part's own grid decides whether it can be sampled at all, even where the whole take's grid is used below.
         let grid = grid(scene, take, span.end - span.start, fps, most)?;
         let part = Part::of_whole(take, &span, fps).unwrap_or_else(|| {
             let time = |f: usize| span.start + grid.time(f);
             let (first, last) = (time(0), time(grid.frames - 1));
             let before = Margin::frames(first - take.start, grid.fps);
             let after = Margin::frames(take.end - last, grid.fps);
+            // Frames around the part continue its rate in both directions.
             let led = (1..=before).rev().map(|k| first - k as f64 / grid.fps);
             let left = (1..=after).map(|k| last + k as f64 / grid.fps);
             Part {
@@ -58,6 +60,7 @@ impl Part {
         let whole = Grid::new(take.end - take.start, fps, MOST_TRANSFORMS)?;
         let frame = |time: f64| {
             let frame = (time - take.start) * whole.fps;
+            // The nearest frame of the whole take, if the time means one.
             let near = (frame - frame.round()).abs() < ON_FRAME;
             (near && whole.frames > 1).then(|| (frame.round() as usize).min(whole.frames - 1))
         };
@@ -84,6 +87,7 @@ impl Part {
 
     /// The part with less around it, where there would be more than `most` frames.
     fn of_at_most(mut self, most: usize) -> Part {
+        // The part itself is kept whole; what is left of the limit goes to the frames before it, then to those after.
         let left = most.saturating_sub(self.own.len());
         let before = self.own.start.min(left);
         self.times.truncate(self.own.end + left - before);

@@ -1,5 +1,6 @@
 //! World matrices with scale, shear and mirroring become rigid transforms at the same places.
 
+use crate::clip::slerp;
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// From a file's axes and units to canonical space.
@@ -40,6 +41,7 @@ impl Frame {
     }
 
     fn conjugate(&self, turn: &Rotation3<f64>) -> UnitQuaternion<f64> {
+        // Conjugation: into the file's axes, turn, and back.
         let matrix = self.axes * turn.matrix() * self.axes.transpose();
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
     }
@@ -51,6 +53,7 @@ impl Frame {
 /// A map that mirrors is reflected through the origin first. Any reflection would make it a rotation, but this one needs no
 /// choice of an axis, so the result can't jump from one frame to the next.
 pub(crate) fn rotation_of(linear: &Matrix3<f64>) -> Option<Rotation3<f64>> {
+    // The scale along each axis of the joint.
     let lengths: Vector3<f64> = Vector3::from_fn(|c, _| linear.column(c).norm());
     if !(lengths.min() > 1e-9 * lengths.max() && lengths.max().is_finite()) {
         return None;
@@ -61,6 +64,7 @@ pub(crate) fn rotation_of(linear: &Matrix3<f64>) -> Option<Rotation3<f64>> {
     if volume.abs() < 1e-9 {
         return None;
     }
+    // A mirroring map: the point reflection leaves a rotation.
     if volume < 0.0 {
         unit = -unit;
     }
@@ -79,6 +83,12 @@ fn nearest_orthogonal(mut x: Matrix3<f64>) -> Option<Matrix3<f64>> {
         }
     }
     Some(x)
+}
+
+/// The transform a fraction `t` of the way from `a` to `b`: positions in a straight line, rotations along the shortest arc.
+pub(crate) fn between(a: &Isometry3<f64>, b: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
+    let place = a.translation.vector.lerp(&b.translation.vector, t);
+    Isometry3::from_parts(place.into(), slerp(&a.rotation, &b.rotation, t))
 }
 
 /// Local transforms, parent from joint, of joints with these world transforms, parents first.

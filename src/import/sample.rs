@@ -88,8 +88,8 @@ pub(super) fn clip(
     })
 }
 
-/// Places the joints at the times of `part`, of a take with this number and start, without a first frame that the motion doesn't go on from. Such a frame stays
-/// only where the caller trims from the very start.
+/// Places the joints at the times of `part`, a part of a take with this number and start. A first frame that is a pose apart
+/// from the motion is left out, unless the caller trims from the very start.
 fn sampled(
     rig: &Rig<'_>,
     (take, start): (usize, f64),
@@ -104,6 +104,7 @@ fn sampled(
         world.remove(0);
         part.leave_out_first();
     }
+    // Frames before, in and after the part, in this order.
     let after = world.split_off(part.own.end);
     let own = world.split_off(part.own.start);
     Ok(Sampled {

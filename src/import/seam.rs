@@ -1,6 +1,6 @@
 //! Whether a clip repeats: whether its end joins its beginning. All thresholds here are chosen.
 
-use crate::clip::carry;
+use crate::clip::{self, carry};
 use nalgebra::{Isometry3, Vector3};
 
 /// Largest distance of joints across the seam, relative to the figure's size: root mean square, and of any one joint.
@@ -38,16 +38,19 @@ pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
         return false;
     }
     let height = world.first().map_or(0.0, |frame| extent(frame));
+    // The move over the ground that one cycle makes.
     let onto_last = carry(first, last);
     let gaps = gaps(&onto_last, first, last);
     let range = frames
         .iter()
         .map(|frame| rms(&difference(first, frame)))
         .fold(0.0, f64::max);
+    // Nothing moves, or the gap is wide for what moves.
     if range < STILL * height || rms(&gaps) > SEAM_OF_RANGE * pose_range(&frames) {
         return false;
     }
     let widest = gaps.iter().map(Vector3::norm).fold(0.0, f64::max);
+    // The last pose isn't the first one.
     if rms(&gaps) > SEAM_RMS * height || widest > SEAM_MAX * height {
         return false;
     }
@@ -65,6 +68,7 @@ fn runs_on(frames: &[Places], jump: &[Vector3<f64>]) -> bool {
         .windows(2)
         .map(|w| difference(&w[0], &w[1]))
         .collect();
+    // How much velocity changes from frame to frame within the clip is what may happen at the seam, too.
     let mut jumps: Vec<f64> = steps
         .windows(2)
         .map(|w| rms(&difference(&w[0], &w[1])))
@@ -74,6 +78,7 @@ fn runs_on(frames: &[Places], jump: &[Vector3<f64>]) -> bool {
     let largest = jumps.last().copied().unwrap_or(0.0);
     let square: f64 = steps.iter().map(|step| rms(step).powi(2)).sum();
     let speed = (square / steps.len().max(1) as f64).sqrt();
+    // Any one limit is enough: each covers a kind of motion that the others would refuse.
     let limits = [
         JUMP_OF_MEDIAN * median,
         JUMP_OF_LARGEST * largest,
@@ -107,12 +112,7 @@ pub(super) fn moving_places(world: &[Vec<Isometry3<f64>>]) -> Vec<Places> {
 
 /// Longest side of the box around the joints, metres.
 pub(super) fn extent(frame: &[Isometry3<f64>]) -> f64 {
-    let side = |axis: usize| {
-        let along = frame.iter().map(|joint| joint.translation.vector[axis]);
-        let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        high - low
-    };
-    (0..3).map(side).fold(0.0, f64::max)
+    clip::extent(frame.iter().map(|joint| joint.translation.vector))
 }
 
 /// The largest distance of a pose from the first one, without the travel.

@@ -56,6 +56,7 @@ fn find(scene: &dyn Scene, wanted: &str) -> Option<usize> {
             .filter(|_| found.next().is_none())
             .map(|(at, _)| at)
     };
+    // From exact to lenient: the name, its letters, what follows an armature's name, and the number.
     let exact = scene.takes().iter().position(|take| take.name == wanted);
     exact
         .or_else(|| only(&|name| same(name, wanted)))
@@ -116,6 +117,7 @@ fn amount(scene: &dyn Scene, take: usize) -> f64 {
         scene.world(Some((take, about.start + span * part)))
     };
     let first = look(0);
+    // Distances count relative to the scene's size, so that units don't matter.
     let size = first
         .iter()
         .map(|m| m.fixed_view::<3, 1>(0, 3).norm())

@@ -22,6 +22,7 @@ pub(crate) fn joints(scene: &dyn Scene) -> Vec<usize> {
     let stays: Vec<bool> = (0..nodes.len()).map(stays).collect();
     let wanted = |node: usize| stays[node] || moved[node] && nodes[node].is_plain;
     let wanted: Vec<bool> = (0..nodes.len()).map(wanted).collect();
+    // The whole branch belongs to the figure: what is above places it, what is below ends it.
     let all = if wanted.contains(&true) {
         with_ancestors(nodes, with_descendants(nodes, wanted))
     } else {

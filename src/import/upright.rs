@@ -4,14 +4,13 @@
 //! and, on the whole, in the motion. Where both agree on an axis other than the stated one, that axis is up.
 
 use super::axes::UpAxis;
+use super::figure;
 use crate::clip::{Joint, Problem};
-use crate::humanoid::{self, HumanoidMap, Slot};
+use crate::humanoid::{HumanoidMap, Slot};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 /// A figure stands along an axis if its extent along it is this many times that across it. Chosen: 63° from the ground.
 const CLEAR: f64 = 2.0;
-/// No humanoid is looked for among more joints than this. Chosen: the search would take long, and no rig of one has as many.
-const MOST_JOINTS: usize = 4096;
 
 /// Where a humanoid's head and feet are.
 pub(crate) struct Stature(HumanoidMap);
@@ -19,9 +18,7 @@ pub(crate) struct Stature(HumanoidMap);
 impl Stature {
     /// That of a humanoid; `None` for other figures.
     pub fn of(joints: &[Joint]) -> Option<Self> {
-        (joints.len() <= MOST_JOINTS)
-            .then(|| humanoid::map(joints).ok())?
-            .map(Self)
+        figure::humanoid(joints).map(Self)
     }
 
     /// From the middle of the feet to the head, or to the nearest joint to it that there is.
@@ -43,6 +40,7 @@ impl Stature {
         axes: &Matrix3<f64>,
     ) -> Option<UpAxis> {
         let stands = along(&self.rise(rest)?)?;
+        // Poses are summed, so that single ones upside down or lying count for little.
         let rises = motion.iter().filter_map(|pose| self.rise(pose));
         let moves = along(&rises.sum::<Vector3<f64>>())?;
         // Left-handed axes can't become right ones by a turn, so nothing is exchanged there.

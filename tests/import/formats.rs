@@ -80,7 +80,7 @@ fn row(path: &Path, folder: &Path) -> Row {
 fn humanoid_of(look: &Inspection) -> (bool, String) {
     match humanoid::map(&look.joints) {
         Ok(map) => (true, format!("yes, {} slots", map.matches.len())),
-        Err(error) => (false, format!("no: {}", reason(&error))),
+        Err(error) => (false, format!("no: {}", error.explain().cause)),
     }
 }
 

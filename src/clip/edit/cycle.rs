@@ -68,6 +68,7 @@ impl Clip {
             .iter()
             .map(|found| found.gap)
             .fold(f64::INFINITY, f64::min);
+        // Of about equally good cycles the shortest, and of these the first.
         let ties = fine.into_iter().filter(|found| found.gap <= best + TIE);
         ties.min_by_key(|found| (found.end - found.start, found.start))
             .ok_or_else(|| {
@@ -123,6 +124,7 @@ impl Clip {
         frames: &mut [Vec<Isometry3<f64>>],
     ) {
         let last = frames.len() - 1;
+        // At least one frame is bent, and at most half of the cycle from either end.
         let window = (SPREAD * self.fps).min(SHARE * last as f64).round() as usize;
         let window = window.clamp(1, last.div_ceil(2));
         // Velocities are differences of frames on both sides of each end, where the take has such frames.
@@ -133,6 +135,7 @@ impl Clip {
         let seam = Seam::between(Side { poses, at: end }, Side { poses: &next, at });
         // A clip that loops already has the velocities that it should have.
         let loops_already = self.loop_mode == LoopMode::Wrap && frames.len() == self.frames.len();
+        // Poses still differ by what the file rounds.
         let seam = if loops_already { seam.of_poses() } else { seam };
         // The beginning is bent where the end leads to, so that both halves of the gap are measured in one place.
         seam.bend_end(frames, window);
@@ -212,6 +215,7 @@ impl<'a> Search<'a> {
         let step = self.stride as f64 / self.clip.fps;
         let most = self.looks.len().saturating_sub(1);
         let least = ((shortest / step - 1e-6) as usize).clamp(1, most.max(1));
+        // Only as many lengths as the limit on pairs allows.
         let longest = (least + PAIRS / self.looks.len().max(1)).min(most);
         let mut best: Vec<Option<Candidate>> = (0..=longest).map(|_| None).collect();
         for start in 0..self.looks.len() {
@@ -221,6 +225,7 @@ impl<'a> Search<'a> {
             let found = best.get(length).and_then(Option::as_ref);
             found.map_or(f64::INFINITY, |candidate| candidate.found.gap)
         };
+        // A length that is worse than its neighbours lies on the slope of a better one.
         let dips = |length: &usize| {
             gap(*length) <= gap(length.wrapping_sub(1)) && gap(*length) <= gap(length + 1)
         };
@@ -238,6 +243,7 @@ impl<'a> Search<'a> {
     /// poses before `least` count for it, too.
     fn try_start(&self, start: usize, least: usize, best: &mut [Option<Candidate>]) {
         let mut range = 0.0_f64;
+        // Shorter lengths than wanted only count for the range of the motion, so a sample of them is enough.
         let between = (1..least).step_by((least / BETWEEN).max(1));
         for length in between.chain(least..best.len()) {
             let Some(look) = self.looks.get(start + length) else {
@@ -246,6 +252,7 @@ impl<'a> Search<'a> {
             let best = &mut best[length];
             let distance = self.looks[start].distance(look);
             range = range.max(distance);
+            // Relative to the motion: a small gap in a small motion is no cycle.
             let gap = distance / range;
             let better = best.as_ref().is_none_or(|best| gap < best.found.gap);
             if length >= least && range > self.still && better {

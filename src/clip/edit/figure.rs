@@ -39,11 +39,13 @@ impl Figure {
     pub fn new(joints: &[Joint], moving: &[bool]) -> Self {
         let carriers = carriers(joints, moving);
         let mut below = vec![1_usize; joints.len()];
+        // Children come after their parents, so backwards every subtree is complete when it is added to its parent.
         for j in (0..joints.len()).rev() {
             if let Some(parent) = joints[j].parent {
                 below[parent] += below[j];
             }
         }
+        // Props and cameras may move by themselves: the figure is what has the most joints.
         let largest = carriers.iter().rev().max_by_key(|&&j| below[j]);
         let top = largest.copied().unwrap_or(0);
         let traveller = fork(joints, top).unwrap_or(top);
@@ -76,6 +78,7 @@ impl Figure {
             apart += (carry.rotation * a + carry.translation.vector - b).norm_squared();
             away += (b - middle).norm_squared();
         }
+        // A turn within what the poses leave unclear would only be noise.
         if carry.rotation.angle() < straight.max((apart / away).sqrt()) {
             self.about_traveller(UnitQuaternion::identity(), from, to)
         } else {
@@ -96,6 +99,7 @@ impl Figure {
     ) -> Isometry3<f64> {
         let place = |world: &[Isometry3<f64>]| world[self.traveller].translation.vector;
         let mut shift = place(to) - turn * place(from);
+        // Over the ground, not up or down.
         shift.z = 0.0;
         Isometry3::from_parts(shift.into(), turn)
     }

@@ -43,13 +43,16 @@ impl Clip {
 
     /// Appends `next` to this clip, whose last piece has `piece` frames: a blend reaches no farther than the middle of either.
     fn follow(&mut self, mut next: Clip, figure: &Figure, piece: usize, blend: f64) {
+        // The next clip's first pose goes where this one's last pose is.
         let carry = figure.carry(&next.world(0), &self.world(self.frames.len() - 1));
         let theirs: Vec<(usize, Isometry3<f64>)> = figure.footings(&next).collect();
         let mut coming = std::mem::take(&mut next.frames);
         self.set_on(figure, &theirs, &carry, &mut coming);
         let half = |frames: usize| frames.saturating_sub(1) / 2;
+        // Half of the blend on either side, but not beyond the middle of a piece, where another seam's blend may begin.
         let window = (0.5 * blend * self.fps).round() as usize;
         let window = window.min(half(piece)).min(half(coming.len()));
+        // Velocities at the seam come from the frames around it, of the last piece and of the next clip alone.
         let near = near(self);
         let end = Side {
             poses: &self.frames[self.frames.len() - piece.min(near + 1)..],
@@ -62,6 +65,7 @@ impl Clip {
         let seam = Seam::between(end, start);
         seam.bend_end(&mut self.frames, window);
         seam.bend_start(&mut coming, window);
+        // Both poses at the seam are one instant now.
         self.frames.extend(coming.into_iter().skip(1));
         self.add_problems(next.problems);
     }
@@ -77,6 +81,7 @@ impl Clip {
     ) {
         let parent = |joint: &usize| self.joints[*joint].parent;
         for ((joint, ours), (_, theirs)) in figure.footings(self).zip(theirs) {
+            // From the other clip's footing, moved over the ground, into this clip's.
             let local = ours.inverse() * carry * theirs;
             let above: Vec<usize> = std::iter::successors(parent(&joint), parent).collect();
             for pose in poses.iter_mut() {

@@ -19,6 +19,7 @@ pub(super) fn landmarks(clip: &Clip, figure: &Figure) -> Vec<usize> {
     let mut far: Vec<f64> = vec![f64::INFINITY; figure.members.len()];
     while chosen.len() < LANDMARKS {
         let latest = place(chosen[chosen.len() - 1]);
+        // Distance of each joint from the nearest one chosen so far.
         for (far, &j) in far.iter_mut().zip(&figure.members) {
             *far = far.min((place(j) - latest).norm());
         }
@@ -58,6 +59,7 @@ impl Look {
             (frame + 1).min(clip.frames.len() - 1),
         );
         let (now, earlier, later) = (places(frame), places(before), places(after));
+        // Central differences, one-sided at the ends of the clip.
         let scale = FORESIGHT * clip.fps / (after - before).max(1) as f64;
         let centre: Vector2<f64> = now.iter().map(|p| p.xy()).sum();
         let centre = centre / now.len().max(1) as f64;
@@ -77,6 +79,7 @@ impl Look {
     /// |a|² + |b|² − 2 |Σ ā b| of their squared distance.
     pub fn distance(&self, other: &Self) -> f64 {
         let (mut dot, mut cross, mut up) = (0.0, 0.0, 0.0);
+        // Σ ā b: its modulus is what the best heading can bring into line.
         for (a, b) in self.flat.iter().zip(&other.flat) {
             dot += a.x * b.x + a.y * b.y;
             cross += a.x * b.y - a.y * b.x;
@@ -84,6 +87,7 @@ impl Look {
         for (a, b) in self.up.iter().zip(&other.up) {
             up += (a - b) * (a - b);
         }
+        // Rounding may leave a tiny negative number where both are equal.
         let flat = self.square + other.square - 2.0 * f64::hypot(dot, cross);
         let landmarks = (self.up.len() / 2).max(1) as f64;
         ((flat.max(0.0) + up) / landmarks).sqrt()

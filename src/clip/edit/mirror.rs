@@ -1,6 +1,6 @@
 //! Mirrored clips: left and right swapped.
 
-use crate::clip::{Clip, Error, Joint, Margin, Problem};
+use crate::clip::{Clip, Error, Joint, Margin, Problem, extent};
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// A pair that rests farther from its mirror image than this fraction of the figure's size is worth a warning: 8 cm in an
@@ -28,8 +28,9 @@ impl Plane {
             .iter()
             .filter_map(|&(left, right)| Some((*places.get(left)?, *places.get(right)?)))
             .collect();
+        // A symmetric rest pose tells where its mirror is, wherever it stands and faces.
         let fitted = Self::fitted(&sides);
-        if !sides.is_empty() && fitted.gap(&sides) <= SYMMETRIC * extent(&places) {
+        if !sides.is_empty() && fitted.gap(&sides) <= SYMMETRIC * extent(places.iter().copied()) {
             fitted
         } else {
             Self::across(Vector3::y_axis(), &sides)
@@ -44,6 +45,7 @@ impl Plane {
     fn fitted(sides: &[(Vector3<f64>, Vector3<f64>)]) -> Self {
         let middle = middle(sides);
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        // Entries of the symmetric 2 × 2 matrix, horizontal parts only: the plane is upright.
         for (left, right) in sides {
             let (d, m) = (left - right, left + right - 2.0 * middle);
             xx += d.x * d.x - m.x * m.x;
@@ -106,16 +108,6 @@ fn rest_world(joints: &[Joint]) -> Vec<Isometry3<f64>> {
     world
 }
 
-/// Longest side of the box around the joints, metres.
-fn extent(places: &[Vector3<f64>]) -> f64 {
-    let side = |axis: usize| {
-        let along = places.iter().map(|p| p[axis]);
-        let (low, high) = along.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        high - low
-    };
-    (0..3).map(side).fold(0.0, f64::max)
-}
-
 /// Whose motion each joint gets.
 struct Partners {
     /// Index of the partner: the joint itself where it has none.
@@ -129,6 +121,7 @@ impl Partners {
         let mut of: Vec<usize> = (0..joints.len()).collect();
         for &(left, right) in pairs {
             let free = |j: usize| of.get(j) == Some(&j);
+            // A joint in two pairs would get two motions.
             if left == right || !free(left) || !free(right) {
                 let joints = joints.len();
                 return Err(Error::Pair {
@@ -202,8 +195,10 @@ impl Clip {
                 continue;
             }
             let partner = partners.of[j];
+            // The partner's turn from rest, mirrored, on top of this joint's own rest.
             let turned = plane.reflect_turn(&turns[partner]) * rest[j];
             let (theirs, rested) = (&frame[partner], &self.joints[partner].rest);
+            // The partner's shift from rest: into world axes, mirrored, and into this joint's parent.
             let shift = under(partner) * (theirs.translation.vector - rested.translation.vector);
             let shift = under(j).inverse() * plane.reflect_along(&shift);
             let place = joint.rest.translation.vector + shift;
@@ -238,7 +233,7 @@ impl Clip {
         let places = places(&self.joints);
         let sides: Vec<_> = pairs.iter().map(|&(l, r)| (places[l], places[r])).collect();
         let gap = plane.gap(&sides);
-        (gap > ASYMMETRIC * extent(&places)).then(|| {
+        (gap > ASYMMETRIC * extent(places.iter().copied())).then(|| {
             Problem::warning(
                 "asymmetric-rest",
                 format!(

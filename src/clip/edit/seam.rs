@@ -101,6 +101,7 @@ impl Side<'_> {
         let half = UnitQuaternion::from_scaled_axis(0.5 * pose.fixed_rows::<3>(3));
         let shifting = after.fixed_rows::<3>(0) - before.fixed_rows::<3>(0);
         let turning = half * after.fixed_rows::<3>(3) - half.inverse() * before.fixed_rows::<3>(3);
+        // How much velocity changes anyway, on either side.
         let (here, there) = (bends(self.poses, j), bends(start.poses, j));
         let shifting = excess(shifting, USUAL * here.0.max(there.0));
         let turning = excess(turning, USUAL * here.1.max(there.1));
@@ -148,6 +149,7 @@ impl Seam {
 
     fn bend(&self, pose: &mut Pose, whole: f64, rate: f64) {
         for (at, gap) in pose.iter_mut().zip(&self.0) {
+            // A shift adds in the parent's axes; a turn multiplies from the right, in the joint's own.
             let by = gap.pose * whole + gap.rate * rate;
             at.translation.vector += by.fixed_rows::<3>(0);
             at.rotation *= UnitQuaternion::from_scaled_axis(by.fixed_rows::<3>(3).into_owned());

@@ -44,6 +44,7 @@ impl Clip {
         let figure = Figure::new(&self.joints, &moving(self));
         let mut clip = self.clone();
         for (joint, footing) in figure.footings(self) {
+            // The velocity in the axes of the carrier's parent, per frame.
             let step: Vector3<f64> = footing.rotation.inverse() * velocity.push(0.0) / self.fps;
             for (f, frame) in clip.frames.iter_mut().enumerate() {
                 frame[joint].translation.vector += step * f as f64;

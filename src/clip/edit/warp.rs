@@ -62,6 +62,7 @@ fn knots(points: &[(f64, f64)], duration: f64) -> Result<Vec<(f64, f64)>, Error>
         knots.push((to, from));
     }
     let (to, from) = knots[knots.len() - 1];
+    // After the last point time runs as before: at slope 1.
     if from < duration {
         knots.push((to + duration - from, duration));
     }
@@ -79,6 +80,7 @@ fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
         _ if k == last => secant(last - 1),
         _ => {
             let (a, b) = (secant(k - 1), secant(k));
+            // Fritsch and Butland's weights: (1 + share of the following interval) / 3.
             let part = (knots[k + 1].0 - knots[k].0) / (knots[k + 1].0 - knots[k - 1].0);
             let share = (1.0 + part) / 3.0;
             a * b / (share * b + (1.0 - share) * a)
@@ -95,6 +97,7 @@ fn source(knots: &[(f64, f64)], slopes: &[f64], time: f64) -> f64 {
     };
     let (t0, s0) = knots[k];
     let (long, x) = (t1 - t0, (time - t0) / (t1 - t0));
+    // Slopes per interval.
     let (rise, start, end) = (s1 - s0, slopes[k] * long, slopes[above] * long);
     let (x2, x3) = (x * x, x * x * x);
     s0 + rise * (3.0 * x2 - 2.0 * x3) + start * (x3 - 2.0 * x2 + x) + end * (x3 - x2)

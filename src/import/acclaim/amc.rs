@@ -137,6 +137,7 @@ impl Reader<'_> {
             let reason = format!("bone `{name}` isn't in its skeleton");
             return Err(line.broken(reason, "put the right .asf beside it"));
         };
+        // The first frame defines the columns; every later frame must name each of them once.
         let place = match self.places.get(&bone) {
             None if self.begun == 1 => self.columns.len(),
             Some(&(place, frame)) if frame < self.begun => place,
@@ -178,6 +179,7 @@ impl Reader<'_> {
 
     fn motion(mut self) -> Result<Motion, AcclaimError> {
         let (named, all) = (self.named, self.columns.len());
+        // A single frame is whole by definition: it defines what a frame has.
         let cut = usize::from(self.begun > 1 && named != all);
         if cut > 0 {
             self.problems.push(Problem::warning(

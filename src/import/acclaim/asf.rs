@@ -194,6 +194,7 @@ impl Reader {
                 remedy,
             })
         };
+        // By name, because the hierarchy names bones in its own order.
         let mut drafts: BTreeMap<String, Draft> = BTreeMap::new();
         for draft in std::mem::take(&mut self.bones) {
             let (line, name) = (draft.line, short(&draft.name));
@@ -213,10 +214,12 @@ impl Reader {
                 let reason = format!("bone `{name}` is in the hierarchy twice or not in :bonedata");
                 return broken(line, reason, "repair the hierarchy");
             };
+            // Children begin at the end of their parent.
             let along = Vector3::from(draft.direction) * draft.length;
             let bone = bones.len();
             bones.push(self.finished(&draft, Some(parent), offset));
             let behind = self.children_of(&name, bone, along);
+            // A bone without children has an end that nothing else marks.
             if behind.is_empty() {
                 let end = Draft::new(0, &format!("{name}_end"));
                 bones.push(self.finished(&end, Some(bone), along));
@@ -273,6 +276,7 @@ impl Reader {
             };
             UnitQuaternion::from_axis_angle(&Vector3::ith_axis(axis), angle)
         };
+        // Fixed axes: the first rotation is the rightmost factor.
         let [first, second, third] = draft.order;
         about(third) * about(second) * about(first)
     }

@@ -11,9 +11,10 @@ mod error;
 mod lines;
 
 use super::error::NoTakes;
+use super::rigid::between;
 use super::scene::{Contents, Node, Scene, Take, composed};
 use super::{measure, names};
-use crate::clip::{Problem, slerp};
+use crate::clip::Problem;
 use amc::Motion;
 use asf::{Bone, Freedom, Skeleton};
 use error::AcclaimError;
@@ -70,7 +71,9 @@ pub(crate) fn read_amc(
 fn contents(format: &'static str, skeleton: &Skeleton, takes: Vec<Take>) -> Contents {
     let bones = skeleton.bones.iter();
     let nodes = bones.map(|bone| Node::bone(bone.name.clone(), bone.parent));
-    let (unit_m, problem) = measure::unit(skeleton.unit_m, &rest(&skeleton.bones));
+    let bones = skeleton.bones.iter();
+    let rest = measure::rest(bones.map(|bone| (bone.parent, bone.offset)));
+    let (unit_m, problem) = measure::unit(skeleton.unit_m, &rest);
     Contents {
         unit_m,
         problems: Vec::from_iter(problem),
@@ -103,15 +106,6 @@ fn take(name: &str, motion: &Motion) -> Take {
     }
 }
 
-/// World positions of the bones' starts without motion, in the file's units.
-fn rest(bones: &[Bone]) -> Vec<Vector3<f64>> {
-    let mut places: Vec<Vector3<f64>> = Vec::with_capacity(bones.len());
-    for bone in bones {
-        places.push(bone.parent.map_or(bone.offset, |p| places[p] + bone.offset));
-    }
-    places
-}
-
 /// Transform of a bone in its parent, given the numbers of its degrees of freedom in the file's units and radians.
 fn local(bone: &Bone, numbers: &[f64]) -> Isometry3<f64> {
     let mut place = Vector3::zeros();
@@ -128,6 +122,7 @@ fn local(bone: &Bone, numbers: &[f64]) -> Isometry3<f64> {
         }
     }
     let place = bone.offset + bone.axes * place;
+    // Into the bone's axes, turn, and back: C · M · C⁻¹.
     let turn = bone.axes * turn * bone.axes.inverse();
     Isometry3::from_parts(Translation3::from(place), turn)
 }
@@ -149,6 +144,7 @@ impl AcclaimScene {
     /// is rounding.
     fn locals_at(&self, motion: &Motion, time: f64) -> Vec<Isometry3<f64>> {
         let rate = motion.rate.unwrap_or(USUAL_RATE);
+        // The frame before, and the fraction of the way to the next one.
         let (position, last) = ((time * rate).max(0.0), motion.frames() - 1);
         let frame = (position as usize).min(last);
         let blend = position - frame as f64;
@@ -157,8 +153,7 @@ impl AcclaimScene {
             return locals;
         }
         for (a, b) in locals.iter_mut().zip(self.locals(motion, frame + 1)) {
-            let place = a.translation.vector.lerp(&b.translation.vector, blend);
-            *a = Isometry3::from_parts(place.into(), slerp(&a.rotation, &b.rotation, blend));
+            *a = between(a, &b, blend);
         }
         locals
     }

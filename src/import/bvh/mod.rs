@@ -7,9 +7,10 @@ mod error;
 mod hierarchy;
 mod words;
 
-use super::measure::{Scale, rate_of_frame_time};
+use super::measure::{Scale, rate_of_frame_time, rest};
+use super::rigid::between;
 use super::scene::{Contents, Node, Scene, Take, composed};
-use crate::clip::{Problem, slerp};
+use crate::clip::Problem;
 use error::BvhError;
 use hierarchy::{Channel, Joint, hierarchy};
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
@@ -44,7 +45,9 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<BvhScene, BvhError> {
     let numbers = numbers(&mut words, width, &mut problems)?;
     let frames = numbers.len() / width;
     problems.extend(other_count(count, frames));
-    let scale = Scale::guess(&rest(&joints));
+    let scale = Scale::guess(&rest(
+        joints.iter().map(|joint| (joint.parent, joint.offset)),
+    ));
     problems.extend(scale.problem());
     let take = Take {
         end: (frames - 1) as f64 / rate,
@@ -101,6 +104,7 @@ fn numbers(
     while let Some(word) = words.next() {
         numbers.push(words.parsed(word, "a number")?);
     }
+    // A file that was cut off ends within a frame.
     let over = numbers.len() % width;
     if over > 0 {
         problems.push(Problem::warning(
@@ -122,16 +126,6 @@ fn other_count(stated: f64, found: usize) -> Option<Problem> {
             format!("the header counts {stated} frames, but {found} follow: these were read"),
         )
     })
-}
-
-/// World positions of the joints at rest, in the file's units.
-fn rest(joints: &[Joint]) -> Vec<Vector3<f64>> {
-    let mut places: Vec<Vector3<f64>> = Vec::with_capacity(joints.len());
-    for joint in joints {
-        let parent = joint.parent.map_or_else(Vector3::zeros, |p| places[p]);
-        places.push(parent + joint.offset);
-    }
-    places
 }
 
 impl BvhScene {
@@ -157,6 +151,7 @@ impl BvhScene {
     /// a frame is rounding.
     fn local_at(&self, joint: &Joint, position: f64) -> Isometry3<f64> {
         let last = self.numbers.len() / self.width - 1;
+        // The frame before, and the fraction of the way to the next one.
         let frame = (position as usize).min(last);
         let a = self.local(joint, frame);
         let blend = position - frame as f64;
@@ -164,11 +159,7 @@ impl BvhScene {
             return a;
         }
         let b = self.local(joint, frame + 1);
-        let place = a.translation.vector.lerp(&b.translation.vector, blend);
-        Isometry3::from_parts(
-            Translation3::from(place),
-            slerp(&a.rotation, &b.rotation, blend),
-        )
+        between(&a, &b, blend)
     }
 }
 

@@ -98,6 +98,7 @@ impl Animation {
         for link in graph.children(object, "AnimationCurveNode") {
             let curve_node = link.child;
             curves.follow(1 + 2 * graph.degree(curve_node))?;
+            // A curve node may drive several models, or the weight of its layer.
             let targets = graph.parents(curve_node, "Model").filter_map(|target| {
                 let property = target.property.and_then(Property::named)?;
                 Some((tree.of_object[target.parent]?, property))
@@ -107,6 +108,7 @@ impl Animation {
                 .parents(curve_node, "AnimationLayer")
                 .any(|link| link.parent == object && link.property == Some(b"Weight"));
             let first = targets.peek().map(|&(node, _)| node);
+            // Curve nodes that drive something else (visibility, materials) aren't read.
             if first.is_none() && !weighs {
                 continue;
             }
@@ -145,6 +147,7 @@ impl Animation {
         if own.any(|channel| channel.property == property) {
             return;
         }
+        // An axis without curve and constant adds nothing in an additive layer, and is at rest in the others.
         let adds = layer > 0 && self.layers[layer].blend == Blend::Additive;
         let otherwise = if adds { Pose::identity() } else { rig.rest };
         let constant =
@@ -190,6 +193,7 @@ impl Animation {
         weights: &[f64],
         tick: f64,
     ) -> Pose {
+        // Channels are in the order of their layers, so that each joins what the layers below have made.
         let mut pose = rig.rest;
         for channel in self.channels(node) {
             let over = channel.value(curves, tick);

@@ -43,6 +43,7 @@ impl<'a> Array<'a> {
 
     /// The decoded bytes, of which `budget` has enough.
     fn bytes(&self, budget: &mut usize) -> Result<Cow<'a, [u8]>, &'static str> {
+        // The budget is spent before anything is allocated.
         let len = self.width().saturating_mul(self.count);
         *budget = budget
             .checked_sub(len)

@@ -219,6 +219,7 @@ fn moving(
         Some((keys.first()?.time, keys.last()?.time))
     });
     let keyed = keyed.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    // ufbx has zeros where the file states no span.
     let stated = Some((stack.time_begin, stack.time_end)).filter(|(start, end)| end > start);
     let (start, end) = first_sane(&[stated, keyed]);
     let spacings = curves(stack).flat_map(|(_, curve)| {
@@ -300,6 +301,7 @@ impl Scene for UfbxScene {
     /// Times are taken to the nearest tick of the file's clock, so that a frame meets its keys exactly.
     fn placed(&self, at: Option<(usize, f64)>) -> Vec<Matrix4<f64>> {
         let ticks = self.ticks;
+        // A take that costs too much is never evaluated.
         let usable = |take: usize| {
             self.contents
                 .takes
@@ -311,6 +313,7 @@ impl Scene for UfbxScene {
             let anim = &self.scene.anim_stacks[take].anim;
             (anim, (time * ticks).round() / ticks)
         });
+        // ufbx evaluates the transforms in the parents; scale inheritance is composed as for our own reader.
         let mut worlds: Vec<World> = Vec::with_capacity(self.ids.len());
         for (node, &id) in self.contents.nodes.iter().zip(&self.ids) {
             let theirs = &self.scene.nodes[id];

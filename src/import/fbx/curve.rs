@@ -26,6 +26,7 @@ impl Curve {
     ) -> Result<Option<Self>, &'static str> {
         let (mut raw, mut mended) = (raw_keys(record, budget)?, false);
         let count = raw.len();
+        // Mend what can be mended: keys without a finite value are dropped, and keys out of order are sorted.
         raw.retain(|key| in_range(key.value));
         mended |= raw.len() != count;
         if !raw.is_sorted_by(|a, b| a.tick <= b.tick) {
@@ -79,6 +80,7 @@ impl Curve {
         let [first, .., last] = self.keys.as_slice() else {
             return self.keys.first().map_or(0.0, |key| key.value);
         };
+        // Before, after and between the keys the curve follows different rules.
         if tick < first.tick {
             self.beyond(self.before, first, self.start_slope(), tick)
         } else if tick > last.tick {
@@ -138,6 +140,7 @@ impl Curve {
         let length = last.tick - first.tick;
         let forward = tick > last.tick;
         let edge = if forward { last } else { first };
+        // A curve shorter than a tick has nothing to repeat.
         if length < 1.0 || repeats == Some(0.0) {
             return edge.value;
         }
@@ -148,13 +151,16 @@ impl Curve {
         };
         let mut turn = (outside / length).floor();
         let mut rest = outside - turn * length;
+        // Beyond the last repetition, its last value holds.
         if let Some(repeats) = repeats.filter(|&repeats| turn >= repeats) {
             (turn, rest) = (repeats - 1.0, length);
         }
+        // The first repetition, number 0, runs backward, then every second one.
         if mirror && turn % 2.0 == 0.0 {
             rest = length - rest;
         }
         let from_start = if forward { rest } else { length - rest };
+        // Each repetition starts from the end of the one before: the rise of all of them is added.
         let climbed = if climb {
             (last.value - first.value) * (turn + 1.0)
         } else {

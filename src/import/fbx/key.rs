@@ -85,6 +85,7 @@ pub(super) fn between(key: &Key, next: &Key, tick: f64) -> f64 {
         Segment::HoldNext => next.value,
         Segment::Line => key.value * (1.0 - s) + next.value * s,
         Segment::Cubic { leave, arrive } => {
+            // The curve is given as time and value over a parameter: first the parameter of this time, then its value.
             let t = bezier_parameter(leave.weight, 1.0 - arrive.weight, s);
             let controls = [
                 key.value,
@@ -107,6 +108,7 @@ fn bernstein([p0, p1, p2, p3]: [f64; 4], t: f64) -> f64 {
 /// a shrinking bracket. With both handles at a third, parameter and time are the same. Sixty halvings of the bracket would
 /// be enough for the last bit of a double.
 fn bezier_parameter(x1: f64, x2: f64, x: f64) -> f64 {
+    // Unweighted tangents, which almost all curves have: no solving needed.
     if x1 == THIRD && x2 == 1.0 - THIRD {
         return x;
     }
@@ -116,14 +118,17 @@ fn bezier_parameter(x1: f64, x2: f64, x: f64) -> f64 {
         if error.abs() < 1e-15 {
             break;
         }
+        // The bracket shrinks to the side where the root is.
         if error > 0.0 {
             high = t
         } else {
             low = t
         }
         let u = 1.0 - t;
+        // Derivative of the time by the parameter.
         let speed = 3.0 * (u * u * x1 + 2.0 * u * t * (x2 - x1) + t * t * (1.0 - x2));
         let newton = t - error / speed;
+        // A step out of the bracket, as near a flat spot, becomes a halving.
         t = if newton > low && newton < high {
             newton
         } else {

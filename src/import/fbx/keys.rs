@@ -101,6 +101,7 @@ pub(super) fn keys(raw: &[RawKey], ticks: f64) -> (Vec<Key>, f64) {
         }
     });
     let keys: Vec<Key> = keys.collect();
+    // The last key's own slope, where it has one, goes on beyond it; else that of the segment before it.
     let computes = raw
         .last()
         .is_some_and(|key| is_cubic(&key.attribute) && !key.attribute.has(TANGENT_USER));
@@ -115,6 +116,7 @@ pub(super) fn keys(raw: &[RawKey], ticks: f64) -> (Vec<Key>, f64) {
 /// Slopes of a key to its left and right, units per second.
 fn sides(raw: &[RawKey], index: usize, ticks: f64) -> (f64, f64) {
     let step = |a: &RawKey, b: &RawKey, weight: f64| {
+        // Two keys at one time are a jump, which has no slope.
         let time = (b.tick - a.tick) / ticks;
         (time > 0.0).then_some(Step {
             time,
@@ -162,6 +164,7 @@ fn segment(attribute: &Attribute, leaving: f64, arriving: f64, seconds: f64) -> 
     if !attribute.has(CUBIC) {
         return Segment::Line;
     }
+    // A handle covers a fraction of the segment's time, and rises with its slope.
     let handle = |weight: f64, slope: f64| Handle {
         weight,
         rise: slope * weight * seconds,

@@ -68,6 +68,7 @@ impl Layer {
         let turned = |v| from_euler(v, order);
         match self.blend {
             Blend::Override => over,
+            // Scales multiply, rotations compose, and everything else adds or mixes number by number.
             Blend::Additive if scales => under.component_mul(&power(over, weight)),
             Blend::Additive if rotates => to_euler(
                 &(turned(under) * slerp(&Matrix3::identity(), &turned(over), weight)),

@@ -131,6 +131,7 @@ fn rig(properties: &Properties) -> Rig {
     let switch = |name, default| properties.int(name).map_or(default, |value| value != 0);
     let rules = Rules {
         order: rotation_order(properties.int("RotationOrder").unwrap_or(0)),
+        // These switches turn off pre- and post-rotation; files that leave them out mean them to count.
         rotation_space: switch("RotationActive", true)
             && !switch("RotationSpaceForLimitOnly", false),
         inherit: match properties.int("InheritType") {

@@ -72,6 +72,7 @@ impl<'d, 'a> Properties<'_, 'd, 'a> {
 
     /// The values of a property, the object's own before those of its template.
     fn values(&self, name: &str) -> Option<&'d [Value<'a>]> {
+        // Objects have few properties, so a search is quicker than an index; templates have many objects each.
         let find = |list: &'d Element<'a>| {
             let property = list
                 .children

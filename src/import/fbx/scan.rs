@@ -59,11 +59,13 @@ impl<'a> Scan<'a> {
         if depth > MAX_DEPTH {
             return Err(broken(at, "records are nested too deep"));
         }
+        // The list of top-level records has no length: only its end marker ends it.
         while depth == 0 || at < end {
             let (header, name_at) = self.header(at, end)?;
             if header.is_end_marker() {
                 return Ok(());
             }
+            // A record must go forward and stay within its parent, or reading it would never end.
             if header.end <= at || header.end > end {
                 let reason = "a record ends outside the record that holds it";
                 return Err(broken(at, reason));
@@ -132,6 +134,7 @@ impl<'a> Scan<'a> {
     fn value(&mut self, at: usize, end: usize) -> Result<usize, FbxError> {
         let kind = self.slice(at, 1, end)?[0];
         let body = at + 1;
+        // Bytes of a value by its type's letter.
         let len = match kind {
             b'C' | b'B' | b'Z' => {
                 self.patch(at, b'C');

@@ -79,6 +79,7 @@ impl Settings {
             ));
         }
         let unit = real("UnitScaleFactor").unwrap_or(1.0);
+        // Centimetres per unit. Anything outside this range is damage (chosen).
         let unit = if (1e-9..=1e9).contains(&unit) {
             unit
         } else {
@@ -174,6 +175,7 @@ impl Axes {
             sign: 1.0,
         });
         let front = front.map_or_else(|| usual_front(up), |front| Self::settle(up, front));
+        // A coordinate axis that is also up or front can't be right: then left follows from the two others.
         let coord = coord.filter(|coord| coord.index != up.index && coord.index != front.index);
         let left = coord.map_or_else(|| up.unit().cross(&front.unit()), Axis::unit);
         Self { up, front, left }

@@ -6,6 +6,7 @@ use super::document::Document;
 use super::properties::Properties;
 use super::record::Element;
 use crate::clip::Problem;
+use crate::import::measure::whole_rate;
 use crate::import::scene::Take;
 use std::collections::BTreeMap;
 
@@ -111,6 +112,7 @@ fn key_range(animation: &Animation, curves: &[Curve]) -> Option<(f64, f64)> {
 fn span(take: &Stated, keyed: Option<(f64, f64)>) -> (f64, f64) {
     let (properties, ticks) = (&take.properties, take.ticks);
     let stated = |start, stop, listed: Option<(i64, i64)>| {
+        // A stated stop without a start begins at 0.
         let own = properties.int(stop);
         let own = own.map(|stop| (properties.int(start).unwrap_or(0), stop));
         let (start, stop) = own.or(listed)?;
@@ -147,20 +149,14 @@ pub(super) fn rate(stated: Option<f64>, spacings: impl Iterator<Item = f64>, tic
 /// Frame rate of the keys' most common spacing; of equally common ones, the fastest.
 fn spacing_fps(spacings: impl Iterator<Item = f64>, ticks: f64) -> Option<f64> {
     let mut counts = BTreeMap::<u64, usize>::new();
+    // Baked curves have a key per frame: the most common spacing is a frame.
     for spacing in spacings.filter(|&spacing| spacing >= 1.0) {
         *counts.entry(spacing as u64).or_default() += 1;
     }
     let (spacing, _) = counts
         .into_iter()
         .max_by_key(|&(spacing, count)| (count, std::cmp::Reverse(spacing)))?;
-    let fps = ticks / spacing as f64;
-    // Exporters round key times to ticks or milliseconds: a whole number within 0.1 % is meant.
-    let whole = fps.round();
-    let fps = if (fps - whole).abs() < 1e-3 * whole {
-        whole
-    } else {
-        fps
-    };
+    let fps = whole_rate(ticks / spacing as f64);
     (1.0..=1000.0).contains(&fps).then_some(fps)
 }
 
@@ -197,6 +193,7 @@ pub(super) fn span_problems(take: &Take, keyed: Option<(f64, f64)>) -> Vec<Probl
             format!("take `{}` was cut to its first six hours", take.name),
         );
     } else if let Some((first, last)) = keyed {
+        // Keys up to a frame outside come from rounding.
         let frame = 1.0 / take.fps;
         if first < take.start - frame || last > take.end + frame {
             note(

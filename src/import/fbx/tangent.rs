@@ -91,6 +91,7 @@ pub(super) fn slopes(
 ) -> (f64, f64) {
     let left = previous.map_or(0.0, |attribute| attribute.next_left());
     let right = own.real(0);
+    // TCB goes before the other kinds: its values are tension, continuity and bias instead of slopes.
     if own.has(TANGENT_TCB) {
         return kochanek_bartels(before, after, own);
     }
@@ -98,6 +99,7 @@ pub(super) fn slopes(
         return (left, right);
     }
     match (before, after) {
+        // The value that states a user's slope states an automatic key's bias, with the sign of time on the left.
         (Some(before), Some(after)) => (
             automatic(before, after, -left, own),
             automatic(before, after, right, own),
@@ -116,6 +118,7 @@ fn pair(slope: f64) -> (f64, f64) {
 /// control", 1984). A missing neighbour's share goes to the other one.
 fn kochanek_bartels(before: Option<Step>, after: Option<Step>, own: Attribute) -> (f64, f64) {
     let [tension, continuity, bias] = [0, 1, 2].map(|i| own.real(i));
+    // Two neighbours share the slope equally.
     let share = if before.is_some() && after.is_some() {
         0.5
     } else {
@@ -134,6 +137,7 @@ fn kochanek_bartels(before: Option<Step>, after: Option<Step>, own: Attribute) -
 /// Automatic slope of a key between two others: the slope of the chord between the neighbours, or its mean with that of the
 /// parabola through the three keys. `bias` is in percent; a positive one draws the slope towards the segment after.
 fn automatic(before: Step, after: Step, bias: f64, own: Attribute) -> f64 {
+    // A key as high as a neighbour stays flat, so that the curve doesn't overshoot it.
     if own.has(CLAMP) && (before.rise == 0.0 || after.rise == 0.0) {
         return 0.0;
     }
@@ -142,6 +146,7 @@ fn automatic(before: Step, after: Step, bias: f64, own: Attribute) -> f64 {
     let slope = if own.has(TIME_INDEPENDENT) {
         chord
     } else {
+        // The parabola's slope is the mean of both segments' slopes, weighted by the length of the other one.
         let share = before.time / span;
         let parabolic = before.slope() * (1.0 - share) + after.slope() * share;
         biased(0.5 * (chord + parabolic), before, after, bias)
@@ -156,6 +161,7 @@ fn automatic(before: Step, after: Step, bias: f64, own: Attribute) -> f64 {
 /// The slope with its bias: drawn towards one of the segments, and steeper beyond 500 percent.
 fn biased(slope: f64, before: Step, after: Step, bias: f64) -> f64 {
     let weight = bias.abs() / 100.0;
+    // ufbx ignores biases below 0.01 percent.
     if weight <= 1e-4 {
         return slope;
     }
@@ -164,6 +170,7 @@ fn biased(slope: f64, before: Step, after: Step, bias: f64) -> f64 {
     } else {
         before.slope()
     };
+    // The sign of the steepening: towards the target, or by the bias where the slope is already there.
     let towards = if (target - slope).abs() > 1e-5 {
         target - slope
     } else {
@@ -182,6 +189,7 @@ fn steepening(bias: f64) -> f64 {
 fn clamped(slope: f64, before: Step, after: Step) -> f64 {
     let sign = 1f64.copysign(slope);
     let limit = |step: Step| {
+        // A handle ends at key + slope × reach: it may not pass the neighbour's value.
         let reach = step.weight * step.time;
         if reach > 0.0 {
             (sign * step.rise / reach).max(0.0)
@@ -194,6 +202,7 @@ fn clamped(slope: f64, before: Step, after: Step) -> f64 {
 
 /// Automatic slope of the first or last key.
 fn at_end(step: Step, bias: f64, own: Attribute) -> f64 {
+    // Clamped curves start and end flat.
     if own.has(CLAMP_PROGRESSIVE) || own.has(CLAMP) && step.rise == 0.0 {
         return 0.0;
     }

@@ -46,6 +46,7 @@ impl<'a> Tape<'a> {
         let (mut open, mut records) = (Vec::<Element>::new(), Vec::new());
         loop {
             match parser.next_event()? {
+                // Records come as events: an open record waits on a stack until its end.
                 Event::StartNode(node) => open.push(self.element(node)?),
                 Event::EndNode => {
                     let Some(done) = open.pop() else { continue };

@@ -102,6 +102,7 @@ pub(super) struct Rules {
 
 /// Rotation of Euler angles in degrees.
 pub(super) fn from_euler(degrees: Vector3<f64>, order: Order) -> Matrix3<f64> {
+    // Angles turn about fixed axes, the first one first, so later rotations multiply from the left.
     order.iter().fold(Matrix3::identity(), |m, &axis| {
         about(axis, degrees[axis]) * m
     })
@@ -112,6 +113,7 @@ fn about(axis: usize, degrees: f64) -> Matrix3<f64> {
     let mut m = Matrix3::identity();
     if degrees != 0.0 {
         let (sin, cos) = degrees.to_radians().sin_cos();
+        // The two other axes in cyclic order, in which a positive angle turns j towards k.
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
         m[(j, j)] = cos;
         m[(k, k)] = cos;
@@ -129,6 +131,7 @@ fn about(axis: usize, degrees: f64) -> Matrix3<f64> {
 pub(super) fn to_euler(m: &Matrix3<f64>, order: Order) -> Vector3<f64> {
     let [i, j, k] = order;
     let parity = if (i + 1) % 3 == j { 1.0 } else { -1.0 };
+    // Rounding may carry the sine beyond 1, where its arc is undefined.
     let sin = (-parity * m[(k, i)]).clamp(-1.0, 1.0);
     let mut angles = Vector3::zeros();
     angles[j] = sin.asin();
@@ -136,6 +139,7 @@ pub(super) fn to_euler(m: &Matrix3<f64>, order: Order) -> Vector3<f64> {
         angles[i] = (parity * m[(k, j)]).atan2(m[(k, k)]);
         angles[k] = (parity * m[(j, i)]).atan2(m[(i, i)]);
     } else {
+        // At a pole both outer axes coincide: the first angle stays 0 and the last one has all of the turn.
         angles[k] = (-parity * m[(i, j)]).atan2(m[(j, j)]);
     }
     angles.map(f64::to_degrees)
@@ -165,6 +169,7 @@ pub(super) struct Local {
 /// rotated, + Rp + Roff + T. Pre- and post-rotation are always in XYZ order.
 fn local(pose: &Pose, rules: &Rules) -> Local {
     use Property::*;
+    // Without its rotation space active, a node ignores pre- and post-rotation and its order of axes.
     let rotation = if rules.rotation_space {
         let own = from_euler(pose.at(Rotation), rules.order);
         from_euler(pose.at(PreRotation), XYZ)
@@ -175,6 +180,7 @@ fn local(pose: &Pose, rules: &Rules) -> Local {
     };
     let scale = pose.at(Scaling);
     let (pivot, centre) = (pose.at(RotationPivot), pose.at(ScalingPivot));
+    // The chain applied to the origin, up to the rotation: −Sp, scaled, + Sp + Soff − Rp.
     let turned = pose.at(ScalingOffset) + centre - scale.component_mul(&centre) - pivot;
     let translation = pose.at(Translation) + pose.at(RotationOffset) + pivot + rotation * turned;
     Local {
@@ -214,6 +220,7 @@ impl World {
 
     /// The world transform of a child whose transform in this node is `local`.
     pub fn below(&self, local: &Local, inherit: Inherit) -> Self {
+        // How the parent's scale reaches the child: in its axes, along the child's own axes, or only what the parent received.
         let (frame, received) = match inherit {
             Inherit::RSrs => (self.linear(), Vector3::repeat(1.0)),
             Inherit::RrSs => (self.frame, self.scale),
@@ -223,6 +230,7 @@ impl World {
             frame: frame * local.rotation,
             scale: local.scale.component_mul(&received),
             received,
+            // Positions always follow the parent's full linear part, whatever the child inherits.
             translation: self.translation + self.linear() * local.translation,
         }
     }

@@ -123,6 +123,7 @@ impl<'a> Accessors<'a> {
             component: component.0,
             normalized: about.normalized,
         };
+        // Without a buffer view all numbers are zero, to be overwritten by sparse ones.
         let mut numbers = match about.buffer_view {
             Some(view) => {
                 self.elements(&layout(view, about.byte_offset.unwrap_or_default(), count))?
@@ -169,6 +170,7 @@ impl<'a> Accessors<'a> {
         self.buffers.get(buffer)?;
         self.hold(length)?;
         let bytes = self.buffers.get(buffer)?;
+        // The view's bytes in its buffer.
         let start = size(view.byte_offset.unwrap_or_default());
         let end = start.checked_add(size(view.byte_length));
         let bytes = end
@@ -183,6 +185,7 @@ impl<'a> Accessors<'a> {
         if stride < size {
             return Err(format!("elements of {size} bytes are only {stride} bytes apart").into());
         }
+        // The last element must end within the view.
         let last = layout.count.saturating_sub(1).checked_mul(stride);
         let end = last.and_then(|last| last.checked_add(size)?.checked_add(layout.offset));
         if layout.count > 0 && end.is_none_or(|end| end > bytes.len()) {
@@ -232,6 +235,7 @@ fn number(component: ComponentType, bytes: &[u8], normalized: bool) -> f64 {
         ComponentType::U32 => (f64::from(u32::from_le_bytes(word)), f64::from(u32::MAX)),
         ComponentType::F32 => return f64::from(f32::from_le_bytes(word)),
     };
+    // The smallest signed integer has no positive counterpart: it becomes −1 as well.
     if normalized {
         (number / most).max(-1.0)
     } else {

@@ -127,11 +127,13 @@ fn inside(folder: &Path, uri: &str) -> Result<PathBuf, Fault> {
     let (name, _) = percent_decoded(uri);
     let name = String::from_utf8_lossy(&name);
     let plain = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    // Other schemes, Windows paths and control bytes never name a file beside this one.
     if name.contains([':', '\\', '\0']) || !Path::new(&*name).components().all(plain) {
         return Err(outside());
     }
     let missing = |e| missing(uri, &e);
     let folder = folder.canonicalize().map_err(missing)?;
+    // A link inside the folder may point out of it: the real path decides.
     let path = folder.join(&*name).canonicalize().map_err(missing)?;
     if path.starts_with(&folder) {
         Ok(path)
@@ -202,6 +204,7 @@ fn base64(text: &[u8]) -> Option<Vec<u8>> {
             bits = bits << 6 | u32::from(sextet(letter)?);
         }
         bits <<= 6 * (4 - group.len());
+        // Four letters are three bytes; a shorter last group has as many whole bytes as its bits fill.
         let whole = group.len() * 6 / 8;
         if whole == 0 {
             return None;

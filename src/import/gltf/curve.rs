@@ -23,6 +23,7 @@ impl<const N: usize> Curve<N> {
         values: Rc<[f64]>,
         interpolation: Interpolation,
     ) -> Result<Self, String> {
+        // A cubic spline has an in-tangent, a value and an out-tangent per key.
         let per_key = if interpolation == Interpolation::CubicSpline {
             3 * N
         } else {
@@ -74,6 +75,7 @@ impl<const N: usize> Curve<N> {
 
     /// The key before `time`, the key after it, the fraction of the way between them, and the seconds between them.
     fn around(&self, time: f64) -> (usize, usize, f64, f64) {
+        // The first key after this time; outside the keys both neighbours are the same one.
         let after = self.times.partition_point(|&key| key <= time);
         let (a, b) = (after.saturating_sub(1), after.min(self.times.len() - 1));
         let gap = self.times[b] - self.times[a];
@@ -112,6 +114,7 @@ impl<const N: usize> Curve<N> {
     fn spline(&self, a: usize, b: usize, t: f64, gap: f64) -> [f64; N] {
         let (from, to) = (self.part(a, 1), self.part(b, 1));
         let (out, into) = (self.part(a, 2), self.part(b, 0));
+        // The Hermite basis: 2t³ − 3t² + 1, t³ − 2t² + t, 3t² − 2t³ and t³ − t².
         let (t2, t3) = (t * t, t * t * t);
         std::array::from_fn(|k| {
             (2.0 * t3 - 3.0 * t2 + 1.0) * from[k]

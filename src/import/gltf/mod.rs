@@ -69,6 +69,7 @@ fn scene(
         takes.push(take);
         curves.push(found);
     }
+    // Takes don't need the bind pose, so a broken skin is no reason to refuse them.
     let stand = Stand {
         nodes: &tree.nodes,
         world: &tree.rest_world(),

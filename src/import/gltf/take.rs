@@ -61,6 +61,7 @@ impl Curves {
     /// The take over the time that its keys span.
     fn take(&self, name: String) -> Take {
         let times = || self.nodes.values().flat_map(NodeCurves::times);
+        // The take lasts from the first key of any curve to the last one.
         let start = times()
             .filter_map(<[f64]>::first)
             .fold(f64::INFINITY, |a, &b| a.min(b));

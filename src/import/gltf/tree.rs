@@ -78,6 +78,7 @@ impl Rest {
 /// Translation, rotation and scale of a matrix. The specification forbids to animate nodes with a matrix, but files do.
 fn parts(matrix: &Matrix4<f64>) -> Placement {
     let linear = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+    // Shear, which three parts can't have, is dropped.
     let turn = rotation_of(&linear).unwrap_or_else(Rotation3::identity);
     let scale = (turn.matrix().transpose() * linear).diagonal();
     Placement {
@@ -183,6 +184,7 @@ fn order(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, G
     if order.len() == parents.len() {
         return Ok(order);
     }
+    // Name one node of the cycle.
     let mut reached = vec![false; parents.len()];
     order.iter().for_each(|&node| reached[node] = true);
     let node = reached
