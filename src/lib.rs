@@ -26,6 +26,9 @@
 //! # }
 //! ```
 
+// A library reports through its results, never to a terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 pub mod clip;
 pub mod evaluate;
 pub mod explain;

@@ -4,6 +4,11 @@
 //! compiler contract a multiplication and an addition, and sums run over a fixed number of lanes, so every instruction
 //! set gives the same bits.
 
+#![allow(
+    unsafe_code,
+    reason = "the processor is asked for its vector instructions before functions compiled for them are called"
+)]
+
 use super::network::Activation;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};

@@ -5,6 +5,11 @@
 //! multiply-add whether the processor has wide instructions or not, and in the same order, so the bits are the same on all
 //! processors.
 
+#![allow(
+    unsafe_code,
+    reason = "the processor is asked whether it has AVX2 before functions compiled for it are called"
+)]
+
 /// Rows of a tile.
 pub(super) const TALL: usize = 4;
 /// Columns of a tile: two vectors of four doubles.

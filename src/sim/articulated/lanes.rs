@@ -5,6 +5,11 @@
 //! instructions that the processor was found to have. Each operation rounds by itself (no fused multiply-add), so all
 //! kinds of lanes give the same bits.
 
+#![allow(
+    unsafe_code,
+    reason = "the processor is asked whether it has AVX2 before functions compiled for it are called"
+)]
+
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use wide::f32x8;
