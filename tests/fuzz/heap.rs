@@ -1,5 +1,7 @@
 //! An allocator that counts, for each thread, the bytes in use and their maximum.
 
+#![allow(unsafe_code, reason = "an allocator is an unsafe trait")]
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
