@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = args
         .next()
         .ok_or("usage: random_motion OUT.motion [SKELETON]")?;
-    let skeleton = Skeleton::load(&args.next().unwrap_or_else(|| "humanoid".into()))?;
+    let skeleton = Skeleton::load(args.next().unwrap_or_else(|| "humanoid".into()))?;
     let waves = waves(skeleton.nv, &mut ChaCha8Rng::seed_from_u64(1));
     let rest = skeleton.rest_qpos();
     let qpos = (0..FRAMES)

@@ -57,7 +57,7 @@ fn schemas() -> (Settings<Value>, Settings<Value>) {
         groups.insert(path.to_owned(), schema.clone());
         for (name, property) in parts
             .iter()
-            .flat_map(|part| part["properties"].as_object())
+            .filter_map(|part| part["properties"].as_object())
             .flatten()
         {
             walk(&join(path, name), property, groups, single);

@@ -157,7 +157,7 @@ fn names(joints: &[Joint]) -> Vec<String> {
 
 /// The joint map in the order of the slots.
 pub fn rows(map: &HumanoidMap, joints: &[Joint]) -> Vec<Row> {
-    let row = |(slot, found): (&humanoid::Slot, &humanoid::Match)| {
+    let row = |(slot, found): (&Slot, &humanoid::Match)| {
         Some(Row {
             slot: slot.name().into(),
             joint: joints.get(found.joint)?.name.clone(),

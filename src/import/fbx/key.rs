@@ -120,9 +120,9 @@ fn bezier_parameter(x1: f64, x2: f64, x: f64) -> f64 {
         }
         // The bracket shrinks to the side where the root is.
         if error > 0.0 {
-            high = t
+            high = t;
         } else {
-            low = t
+            low = t;
         }
         let u = 1.0 - t;
         // Derivative of the time by the parameter.

@@ -142,14 +142,10 @@ fn curves(
             _ => continue,
         };
         let node = node.value();
-        let place = tree
-            .place
-            .get(node)
-            .copied()
-            .ok_or_else(|| GltfError::Tree {
-                node,
-                reason: "it is moved, but it isn't in the file",
-            })?;
+        let place = tree.place.get(node).copied().ok_or(GltfError::Tree {
+            node,
+            reason: "it is moved, but it isn't in the file",
+        })?;
         let name = &tree.nodes[place].name;
         let broken = |reason: String| GltfError::Curve {
             take: take.to_owned(),

@@ -301,8 +301,8 @@ impl<L: Lanes> Quat<L> {
     }
 
     #[inline(always)]
-    pub fn to_matrix(&self) -> Rotation<L> {
-        let Quat { w, v } = *self;
+    pub fn to_matrix(self) -> Rotation<L> {
+        let Quat { w, v } = self;
         let (double, one) = (v + v, L::splat(1.0));
         let [xx, yy, zz] = [double.x * v.x, double.y * v.y, double.z * v.z];
         let [xy, xz, yz] = [double.x * v.y, double.x * v.z, double.y * v.z];

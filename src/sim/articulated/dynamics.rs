@@ -171,7 +171,7 @@ impl<L: Lanes> Dynamics<L> {
         let momentum = momentum.about(&-self.total_inertia.com());
         let error = self.total_inertia.solve(&(momentum - self.momentum));
         // Every body moves with the root, and the root's coordinates are its velocity in world axes.
-        for velocity in self.velocities.iter_mut() {
+        for velocity in &mut self.velocities {
             *velocity = *velocity + error;
         }
         for (k, v) in [error.linear, error.angular].into_iter().enumerate() {

@@ -54,7 +54,7 @@ impl<L: Lanes> PathMatrix<L> {
             // Descendants have been subtracted by now, so this row is final: divide it by the root of its diagonal.
             let inverse = L::splat(1.0) / (own[c.depth] + added[k]).sqrt();
             self.inverse[k] = inverse;
-            for entry in own[..c.depth].iter_mut() {
+            for entry in &mut own[..c.depth] {
                 *entry = *entry * inverse;
             }
             // Subtract what this row contributes to the rows of its ancestors.

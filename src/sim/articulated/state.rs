@@ -88,7 +88,7 @@ impl State {
                 Target::Free => {}
                 Target::Ball(turn) => *own = *turn,
                 Target::Hinge(angle) => {
-                    *own = UnitQuaternion::new_unchecked(Quaternion::from_real(*angle))
+                    *own = UnitQuaternion::new_unchecked(Quaternion::from_real(*angle));
                 }
             }
         }

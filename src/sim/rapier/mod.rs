@@ -142,10 +142,10 @@ impl Rapier {
                 Target::Free => {}
                 // Parent from link at rest, then the target, then the joint's own axes.
                 Target::Ball(turn) => {
-                    joint.data.local_frame1.rotation = convert::rotation(rest * turn * axes)
+                    joint.data.local_frame1.rotation = convert::rotation(rest * turn * axes);
                 }
                 Target::Hinge(angle) => {
-                    joint.data.motors[JointAxis::AngX as usize].target_pos = *angle
+                    joint.data.motors[JointAxis::AngX as usize].target_pos = *angle;
                 }
             }
         }

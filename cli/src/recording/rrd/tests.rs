@@ -10,7 +10,7 @@ fn waving() -> Recording {
     let actor = |late: f64| {
         let poses: Vec<_> = (0..60)
             .map(|f| {
-                let time = f as f64 / fps - late;
+                let time = f64::from(f) / fps - late;
                 let mut qpos = vec![0.0; skeleton.nq];
                 for body in &skeleton.bodies {
                     for joint in &body.joints {
@@ -37,7 +37,7 @@ fn waving() -> Recording {
         Actor {
             com: poses.iter().map(com).collect(),
             angular_momentum: (0..60)
-                .map(|f| Vector3::new(1.0, 4.0, 0.5) * (f as f64 * 0.13 - late).sin())
+                .map(|f| Vector3::new(1.0, 4.0, 0.5) * (f64::from(f) * 0.13 - late).sin())
                 .collect(),
             contact: (0..60).map(|f| vec![f % 30 < 15, f % 30 > 10]).collect(),
             poses,
@@ -54,14 +54,14 @@ fn waving() -> Recording {
             .collect(),
         reference: actor(0.0),
         agent: Some(actor(0.1)),
-        phase: (0..60).map(|f| f as f64 / 59.0).collect(),
+        phase: (0..60).map(|f| f64::from(f) / 59.0).collect(),
         rewards: ["pose", "velocity", "hands and feet", "momentum"]
             .iter()
             .enumerate()
             .map(|(i, name)| Curve {
                 name: (*name).into(),
                 values: (0..60)
-                    .map(|f| 0.8 + 0.2 * (f as f64 * 0.1 + i as f64).sin())
+                    .map(|f| 0.8 + 0.2 * (f64::from(f) * 0.1 + i as f64).sin())
                     .collect(),
             })
             .collect(),
