@@ -2,7 +2,8 @@
 //!
 //! There is a module for each stage that data goes through: [`import`] reads a file into a [`clip`]; [`retarget`] carries
 //! the clip onto the character of a [`skeleton`] and makes a [`motion`]; [`sim`] moves the character under physics;
-//! [`task`] defines what a policy has to learn and [`learn`] how it learns; [`evaluate`] measures the result.
+//! [`task`] defines what a policy has to learn and [`learn`] how it learns; [`run`] keeps the training on disk, and
+//! [`evaluate`] measures the result.
 //!
 //! Conventions, everywhere: right-handed, Z up, X forward, Y left; metres, kilograms, seconds, radians;
 //! quaternions scalar first in files; a transform named `a_from_b` maps coordinates in `b` to coordinates in `a`.
@@ -22,6 +23,29 @@
 //! assert!(retargeted.report.keypoint_error_m.mean < 0.05);
 //! // Coordinates in MuJoCo's order, for every frame: 7 of the root, then those of the joints.
 //! assert!(retargeted.motion.qpos.iter().all(|frame| frame.len() == skeleton.nq));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # From a motion to a policy
+//!
+//! A policy takes minutes to train, so this example is compiled but not run; `examples/train.rs` is the whole of it.
+//!
+//! ```no_run
+//! use mimic::run::{Plan, Run, Session};
+//! # use mimic::{motion::Motion, skeleton::Skeleton};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let skeleton = Skeleton::load("humanoid")?;
+//! # let motion = Motion::load("walk.motion")?;
+//! let run = Run::create("runs/walk", Plan::default(), skeleton, vec![motion])?;
+//! let mut session = Session::open(run)?;
+//! while !session.is_done() {
+//!     session.train_round()?;
+//! }
+//! for case in session.finish(&Default::default())? {
+//!     println!("{}: {:?}", case.motion, case.evaluation.measure("survival"));
+//! }
 //! # Ok(())
 //! # }
 //! ```
