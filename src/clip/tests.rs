@@ -69,12 +69,12 @@ fn turns_are_as_smooth_between_frames_as_over_them() {
         frame[1].rotation = truth(f as f64 / 16.0);
     }
     let at = |time: f64| clip.sample(time)[1].rotation;
-    let between = (4..28).map(|f| (f as f64 + 0.5) / 16.0);
+    let between = (4..28).map(|f| (f64::from(f) + 0.5) / 16.0);
     let off = between.map(|time| at(time).angle_to(&truth(time)));
     let worst = off.fold(0.0, f64::max);
     assert!(worst < 2e-3, "{worst} rad");
     for f in 4..28 {
-        let (time, step) = (f as f64 / 16.0, 1e-4);
+        let (time, step) = (f64::from(f) / 16.0, 1e-4);
         let before = at(time - step).inverse() * at(time);
         let after = at(time).inverse() * at(time + step);
         let jump = (after.scaled_axis() - before.scaled_axis()).norm() / step;

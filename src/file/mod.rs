@@ -91,7 +91,7 @@ mod tests {
         std::fs::create_dir(&taken).expect("a folder");
         std::fs::write(taken.join("inside.txt"), b"kept").expect("written");
         assert!(replace(&taken, b"third").is_err());
-        assert!(replace(&folder.path().join("missing/whole.txt"), b"third").is_err());
+        assert!(replace(folder.path().join("missing/whole.txt"), b"third").is_err());
         assert_eq!(files(&taken), [("inside.txt".to_owned(), b"kept".to_vec())]);
         assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
     }

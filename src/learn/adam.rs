@@ -90,7 +90,7 @@ impl<T: Scalar> Adam<T> {
                     let pieces = parameters.par_chunks_mut(PIECE).zip(mean);
                     pieces.zip(gradient.par_chunks(PIECE)).for_each(
                         |((parameters, mean), gradient)| {
-                            momentum_step(parameters, mean, gradient, step)
+                            momentum_step(parameters, mean, gradient, step);
                         },
                     );
                 }
@@ -102,7 +102,7 @@ impl<T: Scalar> Adam<T> {
                         .zip(self.square[range].par_chunks_mut(PIECE))
                         .zip(gradient.par_chunks(PIECE))
                         .for_each(|(((parameters, mean), square), gradient)| {
-                            adam(parameters, mean, square, gradient, step)
+                            adam(parameters, mean, square, gradient, step);
                         });
                 }
             }

@@ -36,6 +36,9 @@ pub struct Trajectories<'a, T> {
 ///
 /// `Aₜ = δₜ + γλ·Aₜ₊₁` with `δₜ = rₜ + γ·Vₜ₊₁ − Vₜ` (Schulman et al. 2016, "High-dimensional continuous control using
 /// generalized advantage estimation", eq. 16); a termination has `Vₜ₊₁ = 0`, and neither kind of end passes `Aₜ₊₁` on.
+///
+/// # Errors
+/// Arrays of other lengths than the shapes above give.
 pub fn advantages<T: Scalar>(
     rollout: &Trajectories<T>,
     gamma: f64,

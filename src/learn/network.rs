@@ -142,7 +142,7 @@ impl Mlp {
             let bias_gradient = &mut gradient[layer.bias.clone()];
             match self.activation_after(index) {
                 Some(activation) => {
-                    activation_backward(delta_here, output, bias_gradient, activation)
+                    activation_backward(delta_here, output, bias_gradient, activation);
                 }
                 None => sum_rows(delta_here, bias_gradient),
             }

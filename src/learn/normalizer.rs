@@ -34,6 +34,9 @@ impl Normalizer {
     }
 
     /// Takes in raw observations `[rows, columns]`; unchanged when one of them is not finite.
+    ///
+    /// # Errors
+    /// Rows of another length, or an observation that is not finite.
     pub fn update<T: Scalar>(&mut self, rows: &[T]) -> Result<(), LearnError> {
         let columns = self.mean.len();
         let count = rows.len() / columns.max(1);
@@ -103,6 +106,9 @@ impl Normalizer {
 
 impl<T: Scalar> FrozenNormalizer<T> {
     /// Normalises observations `[rows, columns]` into `out` of the same length.
+    ///
+    /// # Errors
+    /// Rows of another length, or an output that is not as long as the input.
     pub fn apply(&self, raw: &[T], out: &mut [T]) -> Result<(), LearnError> {
         let columns = self.mean.len();
         check_length(

@@ -68,6 +68,10 @@ const MAX_LAYERS: usize = 16;
 const JUDGED_AT_ONCE: usize = 64;
 
 impl Policy {
+    /// The networks of these sizes, without parameters.
+    ///
+    /// # Errors
+    /// A layer without width or wider than 65536, or more than 16 hidden layers.
     pub fn new(spec: PolicySpec) -> Result<Self, LearnError> {
         let widths = spec.hidden.iter().chain([&spec.observation, &spec.action]);
         for &width in widths {
@@ -159,6 +163,9 @@ impl Policy {
     }
 
     /// Acts on normalised `observations` `[batch, observation]` with standard normal `noise` `[batch, action]`.
+    ///
+    /// # Errors
+    /// Arrays of other lengths than these shapes.
     pub fn act<'w, T: Scalar>(
         &self,
         parameters: &[T],
@@ -199,6 +206,9 @@ impl Policy {
     }
 
     /// The mean actions `[batch, action]`: what the policy does without noise.
+    ///
+    /// # Errors
+    /// Arrays of other lengths than these shapes.
     pub fn mean<'w, T: Scalar>(
         &self,
         parameters: &[T],
@@ -211,6 +221,9 @@ impl Policy {
     }
 
     /// The critic's estimates of the discounted return, `[batch]`.
+    ///
+    /// # Errors
+    /// Arrays of other lengths than these shapes.
     pub fn values<'w, T: Scalar>(
         &self,
         parameters: &[T],

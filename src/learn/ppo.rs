@@ -40,6 +40,10 @@ pub struct Learner<T> {
 }
 
 impl<T: Scalar> Learner<T> {
+    /// Starts with random parameters, which `rng` draws.
+    ///
+    /// # Errors
+    /// A setting outside its range, or a network of an impossible size.
     pub fn new(
         config: PpoConfig,
         spec: PolicySpec,
@@ -68,6 +72,9 @@ impl<T: Scalar> Learner<T> {
     }
 
     /// Goes on from a saved state, which must be of the same network.
+    ///
+    /// # Errors
+    /// A state of another network, or with arrays that do not fit it; the learner is then unchanged.
     pub fn restore(&mut self, state: LearnerState<T>) -> Result<(), LearnError> {
         if &state.spec != self.policy.spec() {
             let (found, expected) = (
@@ -118,6 +125,9 @@ impl<T: Scalar> Learner<T> {
     }
 
     /// Learns from a batch; `rng` shuffles it. Runs on the current rayon pool with the same bits at any size of it.
+    ///
+    /// # Errors
+    /// A batch whose arrays do not fit each other, or a gradient that is not finite.
     pub fn update(
         &mut self,
         batch: &Batch<T>,
@@ -149,6 +159,9 @@ impl<T: Scalar> Learner<T> {
     }
 
     /// The loss terms of the samples at `indices` and their gradient, beside the parameter vector.
+    ///
+    /// # Errors
+    /// A batch whose arrays do not fit each other, or an index beyond it.
     pub fn gradient(
         &mut self,
         batch: &Batch<T>,

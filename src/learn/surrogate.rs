@@ -154,7 +154,7 @@ impl<T: Scalar> Shard<T> {
                 self.critic.run_critic(
                     task,
                     &mut critic_gradient[..policy.critic.parameter_count()],
-                )
+                );
             },
         );
         self.terms = self.actor.terms;

@@ -90,6 +90,9 @@ impl Motion {
     }
 
     /// That this motion was made for `skeleton`.
+    ///
+    /// # Errors
+    /// A skeleton of another file or with other bodies, or coordinates of other lengths than its own.
     pub fn check_skeleton(&self, skeleton: &Skeleton) -> Result<(), MotionError> {
         let fits = |rows: &[Vec<f64>], n: usize| rows.iter().all(|r| r.len() == n);
         let same = self.skeleton_sha256 == skeleton.sha256

@@ -88,12 +88,12 @@ fn velocities_pass_over_the_seam() {
     }
     let period = motion.duration();
     for k in -3..4 {
-        let time = k as f64 * period + 0.2;
+        let time = f64::from(k) * period + 0.2;
         let q = motion.sample_qpos(&s, time);
         let angle = rate * time;
         assert!((q[0] - radius * angle.sin()).abs() < 1e-3);
-        let before = motion.sample_qpos(&s, k as f64 * period - 1e-9);
-        let after = motion.sample_qpos(&s, k as f64 * period + 1e-9);
+        let before = motion.sample_qpos(&s, f64::from(k) * period - 1e-9);
+        let after = motion.sample_qpos(&s, f64::from(k) * period + 1e-9);
         let jump = s.differentiate(&before, &after, 1.0);
         assert!(jump.iter().all(|d| d.abs() < 1e-6));
         let bodies = motion.sample_bodies(time);

@@ -405,6 +405,6 @@ mod tests {
         broken.learner.parameters.pop();
         assert!(broken.save(&path).is_err());
         assert_eq!(Checkpoint::load(&path).unwrap(), checkpoint());
-        assert!(checkpoint().save(&path.join("no/such/folder")).is_err());
+        assert!(checkpoint().save(path.join("no/such/folder")).is_err());
     }
 }

@@ -71,7 +71,7 @@ impl Run {
         write(&dir.join(files::SKELETON), skeleton.mjcf.as_bytes())?;
         write(&dir.join(files::SLOTS), skeleton.slots_json().as_bytes())?;
         for (i, motion) in motions.iter().enumerate() {
-            motion.save(&dir.join(files::reference(i)))?;
+            motion.save(dir.join(files::reference(i)))?;
         }
         let config = RunConfig {
             format: "run".to_owned(),
@@ -126,7 +126,7 @@ impl Run {
                     reason: format!("motion `{name}` is not a plain file name"),
                 });
             }
-            motions.push(Motion::load(&dir.join(name))?);
+            motions.push(Motion::load(dir.join(name))?);
         }
         Ok(Run {
             dir: dir.to_owned(),

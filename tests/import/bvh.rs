@@ -47,7 +47,7 @@ pub(super) fn evaluate(text: &str) -> Vec<Vec<Place>> {
             }
             "}" => drop(open.pop()),
             "OFFSET" => {
-                joints.last_mut().expect("a joint").offset = [number(1), number(2), number(3)]
+                joints.last_mut().expect("a joint").offset = [number(1), number(2), number(3)];
             }
             "CHANNELS" => {
                 let names = &words[at + 2..at + 2 + number(1) as usize];

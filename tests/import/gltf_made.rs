@@ -53,7 +53,7 @@ fn percent_encoded_buffers_are_read_as_base64_ones_are() {
         let floats = [0.0_f32, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half];
         let bytes: Vec<u8> = floats.iter().flat_map(|x| x.to_le_bytes()).collect();
         read(&synthetic(|file| {
-            file["buffers"][0]["uri"] = uri(&bytes).into()
+            file["buffers"][0]["uri"] = uri(&bytes).into();
         }))
     };
     let coded = |bytes: &[u8]| {

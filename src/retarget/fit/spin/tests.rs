@@ -106,7 +106,7 @@ fn the_momentum_of_a_flight_stays() {
     let (flights, _) = find(&trajectory);
     let spans: Vec<_> = flights.iter().map(|flight| flight.span).collect();
     assert_eq!(spans, [(GATHERS, GATHERS + FLIES)]);
-    let found = super::turns(&trajectory, &flights).frames;
+    let found = turns(&trajectory, &flights).frames;
     let mut frames = still.clone();
     for (qpos, turned) in frames.iter_mut().zip(&found) {
         let Some(FlightTurn { by, flies }) = turned else {
