@@ -164,6 +164,18 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        file: "first-build",
+        rows: &[("program", "program"), ("processor", "cpu")],
+        columns: &[
+            ("clock asked", "asked.minutes min"),
+            ("clock", "minutes min"),
+            ("CPU time", "cpu_minutes min"),
+            ("recording asked", "asked.recording_s s"),
+            ("recording", "recording_s s"),
+            ("training samples/s", "train_samples_per_second"),
+        ],
+    },
+    Table {
         file: "exactness",
         rows: &[("what", "what"), ("against", "against")],
         columns: &[
