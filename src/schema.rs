@@ -93,7 +93,7 @@ fn check_value(schema: &Value, value: &Value, path: &str) -> Result<(), OutOfRan
 }
 
 /// Of a schema with alternatives, the one whose fixed values (such as `kind`) are those of `value`.
-pub fn variant<'a>(schema: &'a Value, value: &Value) -> &'a Value {
+fn variant<'a>(schema: &'a Value, value: &Value) -> &'a Value {
     let alternatives = schema["oneOf"].as_array();
     let is_meant = |alternative: &&Value| {
         let properties = alternative["properties"].as_object();
