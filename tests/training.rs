@@ -184,7 +184,7 @@ fn what_cannot_be_trained_is_refused_before_a_folder_appears() {
         (|plan| task(plan).physics.control_hz = 0.0, "control_hz"),
         (|plan| task(plan).physics.substeps = 0, "substeps"),
         (|plan| task(plan).episode_s = f64::NAN, "episode_s"),
-        (|plan| task(plan).rewards.pose = -1.0, "reward weight"),
+        (|plan| task(plan).rewards.pose = -1.0, "task.rewards.pose"),
         (|plan| plan.final_std = 0.0, "final_std"),
         (|plan| plan.environments = 0, "environments"),
     ];

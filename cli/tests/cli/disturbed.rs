@@ -59,7 +59,7 @@ fn training_can_be_disturbed_and_is_measured_so() {
         "task.perturbations.mass=[2,1]",
     ];
     let said = bench.complaint(&wrong, 2);
-    assert!(said.contains("task.perturbations.mass is [2, 1]"), "{said}");
+    assert!(said.contains("`task.perturbations.mass`: [2, 1] is not allowed"), "{said}");
 }
 
 /// The flag fills in what isn't said, and takes nothing back that is.
