@@ -1,4 +1,4 @@
-//! Whoever acts in the episodes of an evaluation.
+//! What acts in the episodes of an evaluation.
 
 use crate::explain::{Explain, Explanation, explained};
 use crate::learn::LearnError;
@@ -10,7 +10,7 @@ pub trait Agent: Sync {
     /// Buffers of one episode, so that steps allocate nothing.
     type Memory: Default;
 
-    /// The task that it performs.
+    /// The task that the agent performs.
     fn task(&self) -> &Arc<dyn Task>;
 
     /// The action in the present state of `environment`, as long as [`Task::action`] says.

@@ -1,4 +1,4 @@
-//! Deterministic episodes of an agent.
+//! Episodes of an agent, without noise in its actions.
 
 use super::agent::{Agent, EvaluateError};
 use crate::task::{
@@ -15,7 +15,7 @@ struct Running {
 
 /// Performs an episode for each of `starts`: a case that goes on for ever for `seconds`, any other to its end.
 ///
-/// They end by the rules of [`Purpose::Evaluation`], whatever rules the agent was trained under. Up to
+/// Episodes end by the rules of [`Purpose::Evaluation`], whatever rules the agent was trained under. Up to
 /// [`LANES`](crate::sim::LANES) episodes take little longer than one.
 ///
 /// # Errors
@@ -69,11 +69,15 @@ fn keep(episode: &mut Episode, task: &dyn Task, environment: &dyn Environment, s
     episode.keep(frame(task, environment, step), step.outcome);
 }
 
-/// Performs the cases of these numbers one after the other, each for `seconds` or to its end, and each from where the one
-/// before has led. It ends early with a failure, as in [`perform`]. Gives also how many of the cases were begun.
+/// Performs the cases of these numbers one after the other in one episode: each for `seconds` or to its end, and each from
+/// where the one before has led. A failure ends the episode early, as in [`perform`]. Also returns how many of the cases were
+/// begun.
 ///
 /// # Errors
-/// A task of another shape than the agent's, or a case that it hasn't.
+/// A task of another shape than the agent's, or a case that it doesn't have.
+///
+/// # Panics
+/// If the first number is beyond the task's cases.
 pub fn perform_sequence<A: Agent>(
     agent: &A,
     cases: &[usize],
@@ -96,12 +100,14 @@ pub fn perform_sequence<A: Agent>(
         if part > 0 {
             environment.input(Input::Case(number))?;
         }
+        // The case before is performed until the transition begins; these steps count as possible ones too.
         while environment.is_changing() {
             episode.possible += 1;
             if advance(environment.as_mut(), &mut episode)? {
                 return Ok((episode, part));
             }
         }
+        // A second more than a motion lasts at its own pace, for it may begin at a slower one.
         let duration = task.cases()[number].duration_s;
         let steps = duration.map_or(seconds, |s| s + 1.0) * task.control_hz();
         let steps = steps.round().clamp(1.0, environment.possible_steps()) as usize;

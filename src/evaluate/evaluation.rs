@@ -1,4 +1,4 @@
-//! Episodes from many starts, and what they say together.
+//! An evaluation: episodes from many starts, and what is measured over all of them.
 
 use super::agent::{Agent, EvaluateError};
 use super::episode::perform;
@@ -17,7 +17,7 @@ pub struct Options {
     pub episodes: usize,
     /// Length of an episode of a case that goes on for ever, seconds; any other is performed to its end.
     pub seconds: f64,
-    /// Perform the same phases a second time, disturbed by these ranges; the number of the phase is the seed.
+    /// Ranges of disturbances with which every start phase is performed a second time. The number of the phase is the seed.
     pub perturbations: Option<Perturbations>,
 }
 
@@ -42,7 +42,7 @@ pub struct Evaluation {
     pub failures: Vec<FailedEpisode>,
     /// One more episode, from standing still in the rest pose.
     pub from_rest: Disturbed,
-    /// The same phases again, disturbed. Where the reference follows whoever is pushed, errors are measured from there, and
+    /// The same phases again, disturbed. Where the reference follows an agent that was shoved, errors are measured from there, and
     /// no agent fails by being far from where the reference would have been.
     pub perturbed: Option<Disturbed>,
 }
@@ -54,7 +54,7 @@ impl Evaluation {
     }
 }
 
-/// An agent that has more to do than to perform its task: the measures that still mean something.
+/// Episodes in which the agent has more to do than to perform its task, with the measures that still mean something.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disturbed {
     /// How many episodes were performed.
@@ -121,6 +121,7 @@ pub fn evaluate<A: Agent>(
             ..EpisodeStart::new(case, start(n))
         })
     });
+    // As many at once as the engine steps together; the order is that of the starts, whatever the number of threads.
     let all: Vec<EpisodeStart> = phases.chain([rest]).chain(disturbed).collect();
     let episodes: Result<Vec<Vec<Episode>>, EvaluateError> = all
         .par_chunks(LANES)
@@ -130,7 +131,7 @@ pub fn evaluate<A: Agent>(
     Ok(gather(agent.task().as_ref(), count, &episodes))
 }
 
-/// The first `count` of the episodes are undisturbed, the next one starts from rest, the others are disturbed.
+/// Measures `episodes`: the first `count` are undisturbed, the next one starts from rest, the others are disturbed.
 fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
     let (undisturbed, disturbed) = episodes.split_at(count + 1);
     let (phases, rest) = undisturbed.split_at(count);

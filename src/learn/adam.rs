@@ -36,14 +36,17 @@ impl Default for AdamConfig {
 /// How a step is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
+    /// Decay rates and ε of Adam.
     pub adam: AdamConfig,
     /// Plain gradient descent with this momentum, m ← μ·m + g and θ ← θ − α·m, instead of Adam.
     pub momentum: Option<f64>,
     /// Euclidean norm that the whole gradient is clipped to.
     pub max_norm: f64,
+    /// Learning rate of all parameters before `critic_from`.
     pub learning_rate: f64,
     /// First parameter that has the critic's rate instead.
     pub critic_from: usize,
+    /// Learning rate of the parameters from there on.
     pub critic_learning_rate: f64,
 }
 
@@ -59,6 +62,7 @@ pub struct Adam<T> {
 }
 
 impl<T: Scalar> Adam<T> {
+    /// An optimiser of so many `parameters` that hasn't taken a step yet.
     pub fn new(parameters: usize) -> Self {
         Self {
             mean: vec![T::ZERO; parameters],
@@ -67,7 +71,11 @@ impl<T: Scalar> Adam<T> {
         }
     }
 
-    /// One step on `parameters`, the gradient scaled down first so that its Euclidean `norm` is at most that of the rule.
+    /// One step on `parameters`, the gradient scaled down first so that its Euclidean `norm` is at most that of the rule
+    /// (Pascanu et al. 2013, "On the difficulty of training recurrent neural networks", Algorithm 1).
+    ///
+    /// # Panics
+    /// If the state or the gradient has another length than the parameters.
     pub fn step(&mut self, rule: &Rule, parameters: &mut [T], gradient: &[T], norm: f64) {
         self.steps = self.steps.saturating_add(1);
         let scale = if norm > rule.max_norm {
@@ -75,6 +83,7 @@ impl<T: Scalar> Adam<T> {
         } else {
             1.0
         };
+        // Elements don't depend on each other, so cutting them into pieces for the threads changes no bit.
         let at = rule.critic_from.min(parameters.len());
         let rates = [rule.learning_rate, rule.critic_learning_rate];
         for (range, rate) in [0..at, at..parameters.len()].into_iter().zip(rates) {

@@ -1,8 +1,8 @@
 //! What an update reads: a batch of experience, and how it is cut into minibatches and shards.
 
+use super::error::{LearnError, check_length};
 use super::kernels::Scalar;
 use super::policy::Policy;
-use super::{LearnError, check_length};
 use crate::schema::OutOfRange;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
@@ -12,20 +12,23 @@ use rand_chacha::rand_core::Rng;
 pub struct Batch<'a, T> {
     /// `[samples, observation]`, normalised as they were acted on.
     pub observations: &'a [T],
-    /// `[samples, action]`.
+    /// `[samples, action]`: what was done, noise included.
     pub actions: &'a [T],
     /// `[samples]`: log-probability of the actions when they were taken.
     pub log_probs: &'a [T],
     /// `[samples]`: what the critic expected.
     pub values: &'a [T],
-    /// `[samples]`.
+    /// `[samples]`: by how much the actions did better than the critic expected.
     pub advantages: &'a [T],
-    /// `[samples]`.
+    /// `[samples]`: the discounted return, estimated as value + advantage.
     pub returns: &'a [T],
 }
 
 impl<T: Scalar> Batch<'_, T> {
     /// The number of samples.
+    ///
+    /// # Errors
+    /// No samples or too many, a slice of the wrong length, or a return or an advantage that isn't finite.
     pub(super) fn check(&self, policy: &Policy) -> Result<usize, LearnError> {
         let samples = self.returns.len();
         // Indices are u32, and an empty batch has no mean.

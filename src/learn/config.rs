@@ -1,7 +1,7 @@
 //! The settings of the learner.
 
-use super::LearnError;
 use super::adam::AdamConfig;
+use super::error::LearnError;
 use super::surrogate::Objective;
 use crate::schema::{self, OutOfRange};
 use schemars::JsonSchema;
@@ -81,8 +81,11 @@ pub struct PpoConfig {
 }
 
 impl Default for PpoConfig {
+    /// `docs/notebook/training-choices.md` has what `gamma` and `epochs` change. `clip` and `lambda` are those of Schulman et
+    /// al. 2017, "Proximal policy optimization algorithms". All else is chosen.
     fn default() -> Self {
         Self {
+            // A reward 20 control steps later counts a third as much: imitation asks for little foresight.
             gamma: 0.95,
             lambda: 0.95,
             clip: 0.2,
@@ -130,6 +133,7 @@ impl PpoConfig {
         Ok(())
     }
 
+    /// What the loss is made of.
     pub(super) fn objective(&self) -> Objective {
         Objective {
             clip: self.clip,

@@ -86,3 +86,18 @@ impl From<OutOfRange> for LearnError {
         Self::Setting(error)
     }
 }
+
+/// Checks that `what` has as many values as are needed.
+///
+/// # Errors
+/// [`LearnError::Length`] where it hasn't.
+pub(crate) fn check_length(what: &str, found: usize, expected: usize) -> Result<(), LearnError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(LearnError::Length {
+        what: what.to_owned(),
+        found,
+        expected,
+    })
+}

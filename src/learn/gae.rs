@@ -1,7 +1,7 @@
 //! Generalised advantage estimation over parallel environments.
 
+use super::error::{LearnError, check_length};
 use super::kernels::Scalar;
-use super::{LearnError, check_length};
 
 /// How a step left its environment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,12 +18,13 @@ pub enum StepEnd {
 /// What a rollout recorded; every `[steps, environments]` slice is row-major, a row per step.
 #[derive(Clone, Copy, Debug)]
 pub struct Trajectories<'a, T> {
+    /// Environments that stepped side by side.
     pub environments: usize,
-    /// `[steps, environments]`.
+    /// `[steps, environments]`: what each step earned.
     pub rewards: &'a [T],
     /// `[steps, environments]`: the value of the observation acted on.
     pub values: &'a [T],
-    /// `[steps, environments]`.
+    /// `[steps, environments]`: how each step left its environment.
     pub ends: &'a [StepEnd],
     /// `[steps, environments]`: the value of the last observation of an episode, before its reset. Read only where
     /// `ends` is [`StepEnd::Truncated`].
@@ -38,7 +39,7 @@ pub struct Trajectories<'a, T> {
 /// generalized advantage estimation", eq. 16); a termination has `Vₜ₊₁ = 0`, and neither kind of end passes `Aₜ₊₁` on.
 ///
 /// # Errors
-/// Arrays of other lengths than the shapes above give.
+/// [`LearnError::Length`] for a slice of another length than the shapes say.
 pub fn advantages<T: Scalar>(
     rollout: &Trajectories<T>,
     gamma: f64,
@@ -50,11 +51,13 @@ pub fn advantages<T: Scalar>(
     let environments = rollout.environments;
     let steps = rollout.rewards.len() / environments.max(1);
     for environment in 0..environments {
+        // Backward in time, in double precision: every advantage is a running sum of all that follow it.
         let mut next_value = rollout.next_values[environment].to_f64();
         let mut next_advantage = 0.0;
         for step in (0..steps).rev() {
             let i = step * environments + environment;
             let value = rollout.values[i].to_f64();
+            // A time limit says nothing about the state, so its value counts; the next row belongs to another episode.
             let (after, passed_on) = match rollout.ends[i] {
                 StepEnd::Continues => (next_value, next_advantage),
                 StepEnd::Terminated => (0.0, 0.0),

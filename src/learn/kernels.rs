@@ -9,7 +9,7 @@
     reason = "the processor is asked for its vector instructions before functions compiled for them are called"
 )]
 
-use super::network::Activation;
+use super::activation::Activation;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
@@ -30,12 +30,19 @@ pub trait Scalar:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+    /// 0.
     const ZERO: Self;
+    /// 1.
     const ONE: Self;
+    /// The nearest number of this type.
     fn from_f64(value: f64) -> Self;
+    /// The same number in double precision.
     fn to_f64(self) -> f64;
+    /// e to this power.
     fn exp(self) -> Self;
+    /// Hyperbolic tangent.
     fn tanh(self) -> Self;
+    /// Square root.
     fn sqrt(self) -> Self;
 }
 
@@ -175,6 +182,7 @@ fn elu<T: Scalar>(x: T) -> T {
     if x < T::ZERO { x.exp() - T::ONE } else { x }
 }
 
+/// `x = f(x + b)` in each row, with `bias` `[width]`.
 #[inline(always)]
 fn map_rows<T: Scalar>(rows: &mut [T], bias: &[T], f: impl Fn(T) -> T) {
     for row in rows.chunks_exact_mut(bias.len()) {
@@ -184,6 +192,7 @@ fn map_rows<T: Scalar>(rows: &mut [T], bias: &[T], f: impl Fn(T) -> T) {
     }
 }
 
+/// Multiplies `delta` by the slope that each output tells, and adds its rows to `sum` `[width]`: in one pass over memory.
 #[inline(always)]
 fn scale_and_sum_rows<T: Scalar>(
     delta: &mut [T],
@@ -219,6 +228,7 @@ vectorised! {
     /// Turns the gradient by a layer's output into the gradient by its pre-activation, given that output, and adds the
     /// sum over rows to the bias gradient.
     fn activation_backward(delta: &mut [T], output: &[T], bias_gradient: &mut [T], activation: Activation) {
+        // The output alone tells the slope: 1 or 0 for a ReLU, exp(x) = y + 1 for an ELU, 1 − y² for tanh.
         match activation {
             Activation::Relu => scale_and_sum_rows(delta, output, bias_gradient, |y| {
                 if y > T::ZERO { T::ONE } else { T::ZERO }
@@ -252,7 +262,8 @@ vectorised! {
 }
 
 vectorised! {
-    /// Σ x², over 16 lanes that are added last.
+    /// Σ x², over 16 lanes that are added last: two AVX2 vectors of `f32`. A number that is fixed here, and not by the
+    /// instruction set, gives the same bits everywhere.
     fn sum_of_squares(values: &[T]) -> f64 {
         let mut lanes = [T::ZERO; 16];
         let blocks = values.chunks_exact(16);

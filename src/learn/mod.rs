@@ -4,6 +4,7 @@
 //! [`Scalar`], so the code that trains in `f32` is the code whose gradients are checked in `f64`. Results carry the same
 //! bits at any number of threads: work is cut into a fixed number of pieces and sums are added in a fixed order.
 
+mod activation;
 mod adam;
 mod batch;
 mod config;
@@ -24,13 +25,16 @@ mod tests;
 mod trainer;
 mod value_scale;
 
+pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
 pub use batch::{Batch, shuffled};
 pub use config::PpoConfig;
 pub use error::LearnError;
+pub(crate) use error::check_length;
 pub use gae::{StepEnd, Trajectories, advantages};
 pub use kernels::Scalar;
-pub use network::{Activation, Mlp, Workspace};
+pub use network::{Mlp, Workspace};
+pub(crate) use normalizer::OBSERVATION_LIMIT;
 pub use normalizer::{FrozenNormalizer, Normalizer};
 pub use policy::{ActWorkspace, Acted, NamedTensor, Policy, PolicySpec, fill_normal};
 pub use ppo::{Learner, LearnerState};
@@ -39,17 +43,3 @@ pub use stats::UpdateStats;
 pub use surrogate::LossTerms;
 pub use trainer::{Metrics, Trainer, TrainerState};
 pub use value_scale::ValueScale;
-
-/// Normalised observations are clipped to ± this.
-pub(crate) const OBSERVATION_LIMIT: f64 = 10.0;
-
-pub(crate) fn check_length(what: &str, found: usize, expected: usize) -> Result<(), LearnError> {
-    if found == expected {
-        return Ok(());
-    }
-    Err(LearnError::Length {
-        what: what.to_owned(),
-        found,
-        expected,
-    })
-}

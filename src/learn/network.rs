@@ -1,24 +1,10 @@
 //! A multi-layer perceptron over a slice of a flat parameter vector.
 
+use super::activation::Activation;
 use super::kernels::{Matrix, Scalar, activation_backward, bias_and_activate, multiply, sum_rows};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
-
-/// What follows every hidden layer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Activation {
-    /// max(0, x).
-    #[default]
-    Relu,
-    /// x above 0, exp(x) − 1 below.
-    Elu,
-    /// Hyperbolic tangent.
-    Tanh,
-}
 
 /// The shape of a fully connected network: `y = W₂ᵀ·act(W₁ᵀ·x + b₁) + b₂` and so on, no activation after the last layer.
 ///
@@ -34,8 +20,17 @@ pub struct Mlp {
 pub(crate) struct Layer {
     pub(crate) inputs: usize,
     pub(crate) outputs: usize,
+    /// Where weights and biases lie among the network's parameters.
     pub(crate) weight: Range<usize>,
     pub(crate) bias: Range<usize>,
+}
+
+impl Layer {
+    /// The layer's weights `[inputs, outputs]`.
+    fn weights<'a, T>(&self, parameters: &'a [T]) -> Matrix<'a, T> {
+        let weight = &parameters[self.weight.clone()];
+        Matrix::new(weight, self.inputs, self.outputs)
+    }
 }
 
 /// Buffers of forward and backward passes, kept from call to call and grown to the largest batch seen.
@@ -71,6 +66,7 @@ impl Mlp {
         }
     }
 
+    /// Length of the network's part of the parameter vector.
     pub fn parameter_count(&self) -> usize {
         self.layers.last().map_or(0, |layer| layer.bias.end)
     }
@@ -102,12 +98,8 @@ impl Mlp {
             let (before, rest) = workspace.activations.split_at_mut(index);
             let x = before.last().map_or(input, |h| &h[..batch * layer.inputs]);
             let out = grown(&mut rest[0], batch * layer.outputs);
-            let weight = Matrix::new(
-                &parameters[layer.weight.clone()],
-                layer.inputs,
-                layer.outputs,
-            );
-            multiply(out, Matrix::new(x, batch, layer.inputs), weight, false);
+            let x = Matrix::new(x, batch, layer.inputs);
+            multiply(out, x, layer.weights(parameters), false);
             bias_and_activate(
                 out,
                 &parameters[layer.bias.clone()],
@@ -140,6 +132,7 @@ impl Mlp {
             let delta_here = &mut delta[..batch * layer.outputs];
             let output = &activations[index][..batch * layer.outputs];
             let bias_gradient = &mut gradient[layer.bias.clone()];
+            // From the gradient by the layer's output to δ, that by its pre-activation, and its sum over the batch.
             match self.activation_after(index) {
                 Some(activation) => {
                     activation_backward(delta_here, output, bias_gradient, activation);
@@ -153,31 +146,24 @@ impl Mlp {
             };
             let by_output = Matrix::new(&*delta_here, batch, layer.outputs);
             let x = Matrix::new(x, batch, layer.inputs);
-            multiply(
-                &mut gradient[layer.weight.clone()],
-                x.transposed(),
-                by_output,
-                true,
-            );
+            // ∂/∂W = xᵀ·δ, added to what the gradient holds; ∂/∂x = δ·Wᵀ is the δ of the layer below.
+            let weight_gradient = &mut gradient[layer.weight.clone()];
+            multiply(weight_gradient, x.transposed(), by_output, true);
             if index > 0 {
-                let weight = Matrix::new(
-                    &parameters[layer.weight.clone()],
-                    layer.inputs,
-                    layer.outputs,
-                );
-                multiply(
-                    grown(next, batch * layer.inputs),
-                    by_output,
-                    weight.transposed(),
-                    false,
-                );
+                let by_input = grown(next, batch * layer.inputs);
+                let weights = layer.weights(parameters).transposed();
+                multiply(by_input, by_output, weights, false);
                 std::mem::swap(delta, next);
             }
         }
     }
 
     /// Orthogonal weights times a gain (√2 before a ReLU, 1 otherwise, `last_gain` for the last layer), zero biases.
-    /// Saxe et al. 2014, "Exact solutions to the nonlinear dynamics of learning in deep linear neural networks".
+    /// Saxe et al. 2014, "Exact solutions to the nonlinear dynamics of learning in deep linear neural networks". √2 makes up
+    /// for the half of its inputs that a ReLU cuts off (He et al. 2015, "Delving deep into rectifiers").
+    ///
+    /// # Panics
+    /// When `parameters` is shorter than [`Mlp::parameter_count`].
     pub fn initialise<T: Scalar>(
         &self,
         last_gain: f64,

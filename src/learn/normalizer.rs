@@ -1,9 +1,12 @@
 //! Running mean and variance of observations.
 
+use super::error::{LearnError, check_length};
 use super::kernels::{Scalar, standardise};
-use super::{LearnError, check_length};
 
-/// Deviations below this count as this, so that a constant column isn't blown up.
+/// Normalised observations are clipped to ± this many deviations, as in OpenAI's `baselines`.
+pub(crate) const OBSERVATION_LIMIT: f64 = 10.0;
+
+/// Smaller deviations count as this much, so that rounding errors of a constant column aren't blown up. Chosen.
 const SMALLEST_DEVIATION: f64 = 1e-4;
 
 /// Running statistics of each column of the observations.
@@ -11,20 +14,25 @@ const SMALLEST_DEVIATION: f64 = 1e-4;
 pub struct Normalizer {
     /// Rows seen.
     pub count: f64,
+    /// `[columns]`: mean of each column.
     pub mean: Vec<f64>,
-    /// Sum of squared differences from the mean.
+    /// `[columns]`: sum of the squared differences from the mean.
     pub squares: Vec<f64>,
 }
 
 /// A copy for inference: `clamp((x − mean)/deviation, ±limit)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrozenNormalizer<T> {
+    /// `[columns]`: mean of each column.
     pub mean: Vec<T>,
+    /// `[columns]`: one over the standard deviation of each column.
     pub inverse_deviation: Vec<T>,
+    /// Deviations that a normalised observation is clipped to.
     pub limit: T,
 }
 
 impl Normalizer {
+    /// Statistics of no rows yet.
     pub fn new(columns: usize) -> Self {
         Self {
             count: 0.0,
@@ -33,16 +41,17 @@ impl Normalizer {
         }
     }
 
-    /// Takes in raw observations `[rows, columns]`; unchanged when one of them is not finite.
+    /// Takes in raw observations `[rows, columns]`.
     ///
     /// # Errors
-    /// Rows of another length, or an observation that is not finite.
+    /// Rows that aren't whole, or an observation that isn't finite; the statistics then stay as they were.
     pub fn update<T: Scalar>(&mut self, rows: &[T]) -> Result<(), LearnError> {
         let columns = self.mean.len();
         let count = rows.len() / columns.max(1);
         check_length("batch of observations", rows.len(), count * columns)?;
         let mut batch = Self::new(columns);
         batch.count = count as f64;
+        // First the mean, then the differences from it: Σx² − n·mean² would lose all digits of a column far from 0.
         for row in rows.chunks_exact(columns.max(1)) {
             batch
                 .mean
@@ -60,6 +69,7 @@ impl Normalizer {
                 *s += difference * difference;
             }
         }
+        // A NaN or an infinity in any row reaches its column's sum, so one look per column is enough.
         if let Some(column) = batch.squares.iter().position(|s| !s.is_finite()) {
             return Err(LearnError::Observation { column });
         }
@@ -69,6 +79,8 @@ impl Normalizer {
 
     /// Adds the statistics of other rows (Chan, Golub & LeVeque 1983, "Algorithms for computing the sample variance").
     /// Merge in a fixed order to get the same bits.
+    ///
+    /// Columns that only one of the two has are left alone.
     pub fn merge(&mut self, other: &Self) {
         let total = self.count + other.count;
         if other.count == 0.0 {
@@ -93,7 +105,7 @@ impl Normalizer {
         self.squares.iter().map(|s| s / self.count).collect()
     }
 
-    /// A copy for inference that clips to ±`limit` deviations (10 is usual).
+    /// A copy for inference that clips to ±`limit` deviations.
     pub fn frozen<T: Scalar>(&self, limit: f64) -> FrozenNormalizer<T> {
         let inverse = |variance: f64| T::from_f64(1.0 / variance.sqrt().max(SMALLEST_DEVIATION));
         FrozenNormalizer {
@@ -108,7 +120,7 @@ impl<T: Scalar> FrozenNormalizer<T> {
     /// Normalises observations `[rows, columns]` into `out` of the same length.
     ///
     /// # Errors
-    /// Rows of another length, or an output that is not as long as the input.
+    /// Rows that aren't whole, or `out` of another length.
     pub fn apply(&self, raw: &[T], out: &mut [T]) -> Result<(), LearnError> {
         let columns = self.mean.len();
         check_length(

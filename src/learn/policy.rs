@@ -1,8 +1,9 @@
 //! The policy: a diagonal Gaussian around an actor network, and a critic, in one flat parameter vector.
 
+use super::activation::Activation;
+use super::error::{LearnError, check_length};
 use super::kernels::Scalar;
-use super::network::{Activation, Mlp, Workspace};
-use super::{LearnError, check_length};
+use super::network::{Mlp, Workspace};
 use crate::schema::OutOfRange;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,10 +13,13 @@ use std::ops::Range;
 /// The shape of a policy: all that its parameter vector's layout depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PolicySpec {
+    /// Numbers in an observation.
     pub observation: usize,
+    /// Numbers in an action.
     pub action: usize,
     /// Hidden widths of the actor and of the critic.
     pub hidden: Vec<usize>,
+    /// What follows every hidden layer.
     #[serde(default)]
     pub activation: Activation,
 }
@@ -23,8 +27,11 @@ pub struct PolicySpec {
 /// A piece of the parameter vector with a name and a shape.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedTensor {
+    /// Its name in files, such as `actor.0.weight`.
     pub name: String,
+    /// Its dimensions, row-major.
     pub shape: Vec<usize>,
+    /// Where it lies in the parameter vector.
     pub range: Range<usize>,
 }
 
@@ -53,7 +60,7 @@ pub struct ActWorkspace<T> {
 /// What a policy did on a batch of observations.
 #[derive(Clone, Copy, Debug)]
 pub struct Acted<'w, T> {
-    /// `[batch, action]`.
+    /// `[batch, action]`: what it would have done without noise.
     pub means: &'w [T],
     /// `[batch, action]`: mean + std · noise.
     pub actions: &'w [T],
@@ -61,17 +68,19 @@ pub struct Acted<'w, T> {
     pub log_probs: &'w [T],
 }
 
+/// Largest width of a layer, and most hidden layers. Chosen: far above any use, and a damaged file can't ask for more memory
+/// than there is.
 const MAX_WIDTH: usize = 1 << 16;
 const MAX_LAYERS: usize = 16;
 
 /// Rows in one pass of the critic. A product of larger matrices is cut into blocks by its size, which gives other bits.
-const JUDGED_AT_ONCE: usize = 64;
+const CRITIC_ROWS: usize = 64;
 
 impl Policy {
-    /// The networks of these sizes, without parameters.
+    /// The networks of this shape.
     ///
     /// # Errors
-    /// A layer without width or wider than 65536, or more than 16 hidden layers.
+    /// A width of 0 or above 65536, or more than 16 hidden layers.
     pub fn new(spec: PolicySpec) -> Result<Self, LearnError> {
         let widths = spec.hidden.iter().chain([&spec.observation, &spec.action]);
         for &width in widths {
@@ -100,10 +109,12 @@ impl Policy {
         })
     }
 
+    /// The shape.
     pub fn spec(&self) -> &PolicySpec {
         &self.spec
     }
 
+    /// Length of the parameter vector.
     pub fn parameter_count(&self) -> usize {
         self.value_std_index() + 1
     }
@@ -112,6 +123,7 @@ impl Policy {
         0..self.actor.parameter_count()
     }
 
+    /// Where the natural logarithm of the action noise lies in the parameter vector, one number for each action.
     pub fn log_std_range(&self) -> Range<usize> {
         let start = self.actor_range().end;
         start..start + self.spec.action
@@ -150,7 +162,9 @@ impl Policy {
         tensors
     }
 
-    /// Orthogonal weights; the actor's last layer is scaled by 0.01, so that a new policy acts close to zero.
+    /// Orthogonal weights, and action noise of standard deviation `std`. The actor's last layer is scaled by 0.01, so that a
+    /// new policy acts close to zero, as Andrychowicz et al. 2021, "What matters for on-policy deep actor-critic methods?",
+    /// recommend.
     pub fn initialise<T: Scalar>(&self, std: f64, rng: &mut ChaCha8Rng) -> Vec<T> {
         let mut parameters = vec![T::ZERO; self.parameter_count()];
         self.actor
@@ -165,7 +179,7 @@ impl Policy {
     /// Acts on normalised `observations` `[batch, observation]` with standard normal `noise` `[batch, action]`.
     ///
     /// # Errors
-    /// Arrays of other lengths than these shapes.
+    /// Parameters, observations or noise of another length than the shape says.
     pub fn act<'w, T: Scalar>(
         &self,
         parameters: &[T],
@@ -192,6 +206,7 @@ impl Policy {
             let row = mean.iter().zip(noise).zip(&*std);
             actions.extend(row.map(|((&m, &n), &s)| m + s * n));
         }
+        // (action − mean)/std is the noise itself, free of the rounding of the sum above.
         log_probs.clear();
         log_probs.extend(
             noise
@@ -208,7 +223,7 @@ impl Policy {
     /// The mean actions `[batch, action]`: what the policy does without noise.
     ///
     /// # Errors
-    /// Arrays of other lengths than these shapes.
+    /// Parameters or observations of another length than the shape says.
     pub fn mean<'w, T: Scalar>(
         &self,
         parameters: &[T],
@@ -223,7 +238,7 @@ impl Policy {
     /// The critic's estimates of the discounted return, `[batch]`.
     ///
     /// # Errors
-    /// Arrays of other lengths than these shapes.
+    /// Parameters or observations of another length than the shape says.
     pub fn values<'w, T: Scalar>(
         &self,
         parameters: &[T],
@@ -232,7 +247,7 @@ impl Policy {
     ) -> Result<&'w [T], LearnError> {
         self.batch_of(parameters, observations)?;
         workspace.values.clear();
-        for part in observations.chunks(JUDGED_AT_ONCE * self.spec.observation) {
+        for part in observations.chunks(CRITIC_ROWS * self.spec.observation) {
             self.run_critic(parameters, part, workspace);
         }
         Ok(&workspace.values)

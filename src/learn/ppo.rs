@@ -3,22 +3,27 @@
 use super::adam::{Adam, PIECE, Rule};
 use super::batch::{Batch, even_parts, shuffled};
 use super::config::PpoConfig;
+use super::error::{LearnError, check_length};
 use super::kernels::{Scalar, add, sum_of_squares};
 use super::policy::{Policy, PolicySpec, entropy};
-use super::stats::{Run, UpdateStats, explained_variance};
+use super::stats::{UpdateStats, UpdateTotals, explained_variance};
 use super::surrogate::{LossTerms, Samples, Shard};
 use super::value_scale::{ValueScale, mean_and_std};
-use super::{LearnError, check_length};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Everything of a learner that changes while it learns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearnerState<T> {
+    /// Shape of the networks.
     pub spec: PolicySpec,
+    /// `[parameters]`, laid out as [`Policy::tensors`] says.
     pub parameters: Vec<T>,
+    /// The optimiser's running means.
     pub adam: Adam<T>,
+    /// The actor's learning rate now.
     pub learning_rate: f64,
+    /// The scale on which the critic learns returns.
     pub value_scale: ValueScale,
 }
 
@@ -40,10 +45,10 @@ pub struct Learner<T> {
 }
 
 impl<T: Scalar> Learner<T> {
-    /// Starts with random parameters, which `rng` draws.
+    /// A learner that hasn't learned anything yet; `rng` decides its first parameters.
     ///
     /// # Errors
-    /// A setting outside its range, or a network of an impossible size.
+    /// A setting out of its range, or a network of no size or too large.
     pub fn new(
         config: PpoConfig,
         spec: PolicySpec,
@@ -71,10 +76,10 @@ impl<T: Scalar> Learner<T> {
         })
     }
 
-    /// Goes on from a saved state, which must be of the same network.
+    /// Goes on from a saved state.
     ///
     /// # Errors
-    /// A state of another network, or with arrays that do not fit it; the learner is then unchanged.
+    /// A state of another network, or of vectors that don't fit it; the learner is then unchanged.
     pub fn restore(&mut self, state: LearnerState<T>) -> Result<(), LearnError> {
         if &state.spec != self.policy.spec() {
             let (found, expected) = (
@@ -91,18 +96,22 @@ impl<T: Scalar> Learner<T> {
         Ok(())
     }
 
+    /// How it learns.
     pub fn config(&self) -> &PpoConfig {
         &self.config
     }
 
+    /// The networks and their layout.
     pub fn policy(&self) -> &Policy {
         &self.policy
     }
 
+    /// `[parameters]`, laid out as [`Policy::tensors`] says.
     pub fn parameters(&self) -> &[T] {
         &self.state.parameters
     }
 
+    /// Everything that must be saved to go on later.
     pub fn state(&self) -> &LearnerState<T> {
         &self.state
     }
@@ -127,7 +136,7 @@ impl<T: Scalar> Learner<T> {
     /// Learns from a batch; `rng` shuffles it. Runs on the current rayon pool with the same bits at any size of it.
     ///
     /// # Errors
-    /// A batch whose arrays do not fit each other, or a gradient that is not finite.
+    /// A batch of the wrong lengths or with values that aren't finite, or a gradient that stopped being finite.
     pub fn update(
         &mut self,
         batch: &Batch<T>,
@@ -136,32 +145,32 @@ impl<T: Scalar> Learner<T> {
         let samples = batch.check(&self.policy)?;
         self.rescale_values(batch.returns);
         self.prepare(batch);
-        let mut run = Run::default();
+        let mut totals = UpdateTotals::default();
         'epochs: for epoch in 0..self.config.epochs {
-            run.begin_epoch();
+            totals.begin_epoch();
             let order = shuffled(samples, rng);
             for (minibatch, indices) in even_parts(&order, self.minibatches(samples)).enumerate() {
                 let (terms, norm) = self.minibatch_gradient(batch, indices);
                 if !norm.is_finite() {
                     return Err(LearnError::Diverged { epoch, minibatch });
                 }
-                if self.exceeds(terms.approx_kl) {
-                    run.stop(terms.approx_kl);
+                if self.exceeds_kl_limit(terms.approx_kl) {
+                    totals.stop(terms.approx_kl);
                     break 'epochs;
                 }
-                run.record(terms, norm);
+                totals.record(terms, norm);
                 self.step(norm);
             }
         }
-        let stats = self.summary(&run, batch);
-        self.steer(stats.approx_kl);
+        let stats = self.summary(&totals, batch);
+        self.adapt_learning_rate(stats.approx_kl);
         Ok(stats)
     }
 
-    /// The loss terms of the samples at `indices` and their gradient, beside the parameter vector.
+    /// The loss terms of the samples at `indices` and their gradient, laid out as the parameters.
     ///
     /// # Errors
-    /// A batch whose arrays do not fit each other, or an index beyond it.
+    /// A batch of the wrong lengths or with values that aren't finite, or an index beyond it.
     pub fn gradient(
         &mut self,
         batch: &Batch<T>,
@@ -180,18 +189,22 @@ impl<T: Scalar> Learner<T> {
         Ok((terms, &self.gradient))
     }
 
+    /// Minibatches of nearly the size that was asked for. Cutting the batch evenly leaves no small rest, whose noisy gradient
+    /// would weigh as much as that of a whole minibatch.
     fn minibatches(&self, samples: usize) -> usize {
         (samples as f64 / self.config.minibatch as f64)
             .round()
             .max(1.0) as usize
     }
 
-    fn exceeds(&self, kl: f64) -> bool {
+    /// Whether the policy has moved too far from the one that acted for its samples to be of use.
+    fn exceeds_kl_limit(&self, kl: f64) -> bool {
         self.config
             .target_kl
             .is_some_and(|target| kl > self.config.stop_kl_factor * target)
     }
 
+    /// Before targets are computed, so that these samples are already learned on the new scale.
     fn rescale_values(&mut self, returns: &[T]) {
         if self.config.normalize_returns {
             self.state.value_scale.follow(returns);
@@ -202,6 +215,9 @@ impl<T: Scalar> Learner<T> {
     }
 
     /// Normalised advantages, and returns on the critic's scale.
+    ///
+    /// Advantages are normalised over the whole batch and not over each minibatch, so that a sample weighs the same in
+    /// whichever minibatch it lands.
     fn prepare(&mut self, batch: &Batch<T>) {
         let (mean, std) = mean_and_std(batch.advantages);
         let standardise = |x: &T, mean: f64, std: f64| T::from_f64((x.to_f64() - mean) / std);
@@ -225,7 +241,8 @@ impl<T: Scalar> Learner<T> {
             .extend(batch.returns.iter().map(|r| standardise(r, mean, std)));
     }
 
-    /// Fills `gradient` with that of the loss over the samples at `indices`; gives the loss's terms and the norm.
+    /// Fills `gradient` with that of the loss over the samples at `indices`, and returns the loss's terms and the gradient's
+    /// norm. Each shard takes a fixed part of the samples: how many threads there are changes no sum.
     fn minibatch_gradient(&mut self, batch: &Batch<T>, indices: &[u32]) -> (LossTerms, f64) {
         let objective = self.config.objective();
         let samples = Samples {
@@ -258,7 +275,8 @@ impl<T: Scalar> Learner<T> {
         )
     }
 
-    /// Adds the shards' gradients in order, piece by piece, and gives the norm of the sum.
+    /// Adds the shards' gradients in order, piece by piece, and returns the norm of the sum. Pieces have a fixed size and their
+    /// squares are added in order, so that the norm has the same bits at any number of threads.
     fn reduce(&mut self) -> f64 {
         let shards = &self.shards;
         let pieces = self
@@ -277,6 +295,7 @@ impl<T: Scalar> Learner<T> {
         self.piece_norms.iter().sum::<f64>().sqrt()
     }
 
+    /// Takes one gradient step; `norm` is that of the gradient.
     fn step(&mut self, norm: f64) {
         let (config, rate) = (&self.config, self.state.learning_rate);
         // Where the actor's rate moves, the critic's moves with it.
@@ -297,26 +316,27 @@ impl<T: Scalar> Learner<T> {
             .step(&rule, &mut state.parameters, &self.gradient, norm);
     }
 
-    fn summary(&self, run: &Run, batch: &Batch<T>) -> UpdateStats {
-        let steps = run.steps.max(1) as f64;
-        let terms = run.terms.scaled(1.0 / steps);
+    fn summary(&self, totals: &UpdateTotals, batch: &Batch<T>) -> UpdateStats {
+        let steps = totals.steps.max(1) as f64;
+        let terms = totals.terms.scaled(1.0 / steps);
         UpdateStats {
             policy_loss: terms.policy,
             value_loss: terms.value,
             action_bound_loss: terms.action_bound,
-            approx_kl: run.kl(),
+            approx_kl: totals.kl(),
             clip_fraction: terms.clip_fraction,
             explained_variance: explained_variance(batch.values, batch.returns),
             entropy: entropy(&self.state.parameters[self.policy.log_std_range()]),
-            gradient_norm: run.norms / steps,
+            gradient_norm: totals.norms / steps,
             learning_rate: self.state.learning_rate,
-            steps: run.steps,
-            stopped_early: run.stopped.is_some(),
+            steps: totals.steps,
+            stopped_early: totals.stopped.is_some(),
         }
     }
 
-    /// Moves the learning rate towards steps of the target size.
-    fn steer(&mut self, kl: f64) {
+    /// Moves the learning rate towards updates of the target KL divergence: the factors are those of `rsl_rl`, the program
+    /// of Rudin et al. 2022, "Learning to walk in minutes using massively parallel deep reinforcement learning".
+    fn adapt_learning_rate(&mut self, kl: f64) {
         let Some(target) = self.config.target_kl else {
             return;
         };

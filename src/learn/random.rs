@@ -8,7 +8,7 @@ use rand_chacha::rand_core::SeedableRng;
 pub(super) fn stream(seed: u64, number: u64, round: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(number);
-    // Far more numbers than one round can use.
+    // Each part begins 2⁴⁰ words further on, far more than one round can use.
     rng.set_word_pos(u128::from(round) << 40);
     rng
 }

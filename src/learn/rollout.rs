@@ -3,8 +3,11 @@
 //! A group is the unit of parallel work. Which environments it holds depends on the settings alone, never on the number of
 //! threads, and every environment has its own random stream: so the samples are the same everywhere.
 
+use super::error::LearnError;
+use super::gae::StepEnd;
+use super::normalizer::FrozenNormalizer;
+use super::policy::{ActWorkspace, Policy, fill_normal};
 use super::random::stream;
-use super::{ActWorkspace, FrozenNormalizer, LearnError, Policy, StepEnd, fill_normal};
 use crate::task::{
     Draws, Environment, Outcome, Purpose, StartDistribution, Step, Stepping, Tally, Task, size,
     step_together,
@@ -20,7 +23,7 @@ pub(super) struct Actor<'a> {
     pub starts: &'a StartDistribution,
 }
 
-/// Samples of one iteration; `[steps, environments]` row-major, observations and actions a row more.
+/// Samples of one iteration: `[steps, environments]` row-major, observations and actions with a row of numbers for each.
 #[derive(Default)]
 pub(super) struct Buffer {
     /// As the environments gave them.
@@ -37,7 +40,7 @@ pub(super) struct Buffer {
     pub next_values: Vec<f32>,
     /// Every episode that ended.
     pub episodes: Vec<EpisodeTotals>,
-    /// By the bins of the [`StartDistribution`].
+    /// Steps and failures in each bin of the [`StartDistribution`].
     pub tally: Tally,
     /// Sums over all steps, one per reward term of the task.
     pub terms: Vec<f64>,
@@ -71,6 +74,7 @@ impl Buffer {
 pub(super) struct EpisodeTotals {
     /// Sum of rewards.
     pub reward: f32,
+    /// Control steps taken.
     pub steps: u32,
     /// Steps that it would have had without failing.
     pub possible: f64,
@@ -90,7 +94,9 @@ pub(super) struct Group {
     terms: usize,
     /// Current raw observations, `[environments, observation]`.
     current: Vec<f32>,
+    /// The same, normalised.
     normal: Vec<f32>,
+    /// Standard normal deviates of the next actions, `[environments, action]`.
     noise: Vec<f32>,
     workspace: ActWorkspace<f32>,
     pub buffer: Buffer,
@@ -135,12 +141,13 @@ impl Group {
             self.act(actor)?;
             self.step(actor)?;
         }
-        let judged = actor.policy.values(
+        // The parameters don't change within an iteration, so all its values can be computed at the end, many rows at once.
+        let values = actor.policy.values(
             actor.parameters,
             &self.buffer.observations,
             &mut self.workspace,
         )?;
-        self.buffer.values.extend_from_slice(judged);
+        self.buffer.values.extend_from_slice(values);
         actor.normalizer.apply(&self.current, &mut self.normal)?;
         let values = actor
             .policy
@@ -149,6 +156,7 @@ impl Group {
         Ok(())
     }
 
+    /// Numbers in an observation.
     fn width(&self) -> usize {
         self.current.len() / self.members.len()
     }
@@ -158,6 +166,7 @@ impl Group {
         let actions = self.noise.len() / self.members.len();
         let rows = self.noise.chunks_exact_mut(actions);
         for (member, noise) in self.members.iter_mut().zip(rows) {
+            // From each environment's own stream, so that how environments are grouped changes no draw.
             fill_normal(noise, &mut member.rng);
         }
         actor.normalizer.apply(&self.current, &mut self.normal)?;
@@ -175,7 +184,7 @@ impl Group {
         Ok(())
     }
 
-    /// Takes the last actions drawn, and keeps what they led to.
+    /// Takes a step with the actions drawn last, and keeps what it led to.
     fn step(&mut self, actor: &Actor) -> Result<(), LearnError> {
         let first = self.buffer.actions.len() - self.noise.len();
         // A failure counts where the step began.
@@ -207,6 +216,8 @@ impl Group {
         let (end, final_value) = match step.outcome {
             Outcome::Running => (StepEnd::Continues, 0.0),
             Outcome::Failed(_) | Outcome::Finished => (StepEnd::Terminated, 0.0),
+            // The episode would have gone on: what the critic expects from here replaces the steps that were cut off (Pardo et
+            // al. 2018, "Time limits in reinforcement learning").
             Outcome::TimeLimit => {
                 let seen = &mut self.normal[..width];
                 actor.normalizer.apply(row, seen)?;

@@ -1,6 +1,8 @@
 //! The settings of a trainer.
 
-use super::{Activation, LearnError, PpoConfig};
+use super::activation::Activation;
+use super::config::PpoConfig;
+use super::error::LearnError;
 use crate::schema;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -8,20 +8,24 @@ use serde::{Deserialize, Serialize};
 /// How an update went. Losses are means over the minibatches used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct UpdateStats {
+    /// The clipped surrogate; see [`LossTerms::policy`].
     pub policy_loss: f64,
     /// Mean squared error on the critic's own scale.
     pub value_loss: f64,
+    /// Squared excess of mean actions over their bound, before its coefficient.
     pub action_bound_loss: f64,
-    /// Mean over the last epoch; of the last minibatch if that stopped the update.
+    /// KL divergence of the new policy from the old, nats: the mean over the last epoch, or that of the last minibatch if it
+    /// stopped the update.
     pub approx_kl: f64,
+    /// Share of samples whose probability ratio left 1 ± ε.
     pub clip_fraction: f64,
     /// `1 − Var(return − value)/Var(return)` of the critic before the update.
     pub explained_variance: f64,
-    /// Of the policy after the update, nats.
+    /// Entropy of the policy after the update, nats.
     pub entropy: f64,
     /// Mean Euclidean norm of the gradient before clipping.
     pub gradient_norm: f64,
-    /// That this update used.
+    /// The actor's learning rate in this update.
     pub learning_rate: f64,
     /// Gradient steps taken.
     pub steps: usize,
@@ -31,16 +35,19 @@ pub struct UpdateStats {
 
 /// Sums over the minibatches of one update.
 #[derive(Default)]
-pub(super) struct Run {
+pub(super) struct UpdateTotals {
     pub(super) terms: LossTerms,
+    /// Euclidean norms of the gradients before clipping.
     pub(super) norms: f64,
     pub(super) steps: usize,
+    /// KL divergences of the present epoch's minibatches.
     pub(super) epoch_kl: f64,
     pub(super) epoch_steps: usize,
+    /// KL divergence of the minibatch that ended the update early.
     pub(super) stopped: Option<f64>,
 }
 
-impl Run {
+impl UpdateTotals {
     pub(super) fn begin_epoch(&mut self) {
         self.epoch_kl = 0.0;
         self.epoch_steps = 0;
@@ -64,6 +71,8 @@ impl Run {
     }
 }
 
+/// `1 − Var(return − value)/Var(return)`, 0 where all returns are the same: 1 for a critic that foresees every return, 0 for
+/// one that knows no more than their mean.
 pub(super) fn explained_variance<T: Scalar>(values: &[T], returns: &[T]) -> f64 {
     let errors: Vec<f64> = returns
         .iter()

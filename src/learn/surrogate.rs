@@ -8,6 +8,7 @@ use std::ops::{AddAssign, Range};
 /// The weights of the loss's terms.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Objective {
+    /// ε of the clipped surrogate.
     pub(crate) clip: f64,
     pub(crate) value_coefficient: f64,
     pub(crate) entropy_coefficient: f64,
@@ -68,27 +69,28 @@ impl LossTerms {
 /// One of the fixed number of pieces that a minibatch is cut into: buffers and results.
 #[derive(Clone, Debug)]
 pub(crate) struct Shard<T> {
-    /// Beside the parameter vector; what this shard adds to the minibatch's gradient.
+    /// `[parameters]`: what this shard adds to the minibatch's gradient.
     pub(crate) gradient: Vec<T>,
     /// Sums over this shard's samples.
     pub(crate) terms: LossTerms,
+    /// Normalised observations of this shard's samples, a row each.
     observations: Vec<T>,
-    actor: Half<T>,
-    critic: Half<T>,
+    actor: NetworkPass<T>,
+    critic: NetworkPass<T>,
 }
 
 /// What one of the two networks works with.
 #[derive(Clone, Debug, Default)]
-struct Half<T> {
+struct NetworkPass<T> {
     network: Workspace<T>,
-    /// Gradient by the network's output.
+    /// `[samples, outputs]`: gradient by the network's output.
     delta: Vec<T>,
     terms: LossTerms,
 }
 
 /// What the two networks of a shard read.
 #[derive(Clone, Copy)]
-struct Task<'a, T> {
+struct Inputs<'a, T> {
     policy: &'a Policy,
     objective: &'a Objective,
     parameters: &'a [T],
@@ -103,7 +105,7 @@ struct Task<'a, T> {
 impl<T: Scalar> Shard<T> {
     pub(crate) fn new(parameters: usize) -> Self {
         let gradient = vec![T::ZERO; parameters];
-        let half = Half {
+        let pass = NetworkPass {
             network: Workspace::default(),
             delta: Vec::new(),
             terms: LossTerms::default(),
@@ -113,8 +115,8 @@ impl<T: Scalar> Shard<T> {
             gradient,
             terms,
             observations: Vec::new(),
-            actor: half.clone(),
-            critic: half,
+            actor: pass.clone(),
+            critic: pass,
         }
     }
 
@@ -135,43 +137,32 @@ impl<T: Scalar> Shard<T> {
                 .extend_from_slice(row(samples.observations, i, width));
         }
         self.gradient.fill(T::ZERO);
-        let observations = &self.observations;
-        let weight = 1.0 / minibatch as f64;
-        let task = Task {
+        let inputs = Inputs {
             policy,
             objective,
             parameters,
             samples,
             indices,
-            observations,
-            weight,
+            observations: &self.observations,
+            weight: 1.0 / minibatch as f64,
         };
+        // The two networks share no parameter, so their passes run side by side.
         let (actor_gradient, critic_gradient) =
             self.gradient.split_at_mut(policy.critic_range().start);
         rayon::join(
-            || self.actor.run_actor(task, actor_gradient),
-            || {
-                self.critic.run_critic(
-                    task,
-                    &mut critic_gradient[..policy.critic.parameter_count()],
-                );
-            },
+            || self.actor.run_actor(inputs, actor_gradient),
+            || self.critic.run_critic(inputs, critic_gradient),
         );
         self.terms = self.actor.terms;
         self.terms += self.critic.terms;
     }
 }
 
-impl<T: Scalar> Half<T> {
-    /// `gradient` covers the actor's parameters and `log_std`.
-    fn run_actor(&mut self, task: Task<T>, gradient: &mut [T]) {
-        let Task {
-            policy,
-            parameters,
-            observations,
-            ..
-        } = task;
-        let batch = task.indices.len();
+impl<T: Scalar> NetworkPass<T> {
+    /// The terms that depend on the actions, and their gradient. `gradient` covers the actor's parameters and `log_std`.
+    fn run_actor(&mut self, inputs: Inputs<T>, gradient: &mut [T]) {
+        let (policy, parameters) = (inputs.policy, inputs.parameters);
+        let (observations, batch) = (inputs.observations, inputs.indices.len());
         let actor_parameters = &parameters[policy.actor_range()];
         let means = policy
             .actor
@@ -180,7 +171,7 @@ impl<T: Scalar> Half<T> {
             gradient.split_at_mut(policy.actor.parameter_count());
         self.delta.clear();
         self.delta.resize(means.len(), T::ZERO);
-        self.terms = policy_terms(task, means, &mut self.delta, log_std_gradient);
+        self.terms = policy_terms(inputs, means, &mut self.delta, log_std_gradient);
         policy.actor.backward(
             actor_parameters,
             observations,
@@ -191,24 +182,21 @@ impl<T: Scalar> Half<T> {
         );
     }
 
-    fn run_critic(&mut self, task: Task<T>, gradient: &mut [T]) {
-        let Task {
-            policy,
-            parameters,
-            observations,
-            ..
-        } = task;
-        let batch = task.indices.len();
+    /// Squared errors of the values on the critic's scale, and their gradient. `gradient` covers the critic's parameters and
+    /// what comes after them, which isn't learned by gradient.
+    fn run_critic(&mut self, inputs: Inputs<T>, gradient: &mut [T]) {
+        let (policy, parameters) = (inputs.policy, inputs.parameters);
+        let (observations, batch) = (inputs.observations, inputs.indices.len());
         let critic_parameters = &parameters[policy.critic_range()];
         let values =
             policy
                 .critic
                 .forward(critic_parameters, observations, batch, &mut self.network);
-        let slope = T::from_f64(2.0 * task.objective.value_coefficient * task.weight);
+        let slope = T::from_f64(2.0 * inputs.objective.value_coefficient * inputs.weight);
         self.terms = LossTerms::default();
         self.delta.clear();
-        for (&value, &i) in values.iter().zip(task.indices) {
-            let error = value - task.samples.targets[i as usize];
+        for (&value, &i) in values.iter().zip(inputs.indices) {
+            let error = value - inputs.samples.targets[i as usize];
             self.terms.value += (error * error).to_f64();
             self.delta.push(slope * error);
         }
@@ -218,7 +206,7 @@ impl<T: Scalar> Half<T> {
             batch,
             &self.delta,
             &mut self.network,
-            gradient,
+            &mut gradient[..policy.critic.parameter_count()],
         );
     }
 }
@@ -226,38 +214,31 @@ impl<T: Scalar> Half<T> {
 /// The clipped surrogate of Schulman et al. 2017, "Proximal policy optimization algorithms", eq. 7, the entropy and the
 /// action bound: their sums over samples, and their gradients by the mean actions and by log σ.
 fn policy_terms<T: Scalar>(
-    task: Task<T>,
+    inputs: Inputs<T>,
     means: &[T],
     delta: &mut [T],
     log_std_gradient: &mut [T],
 ) -> LossTerms {
-    let Task {
-        policy,
-        objective,
-        samples,
-        ..
-    } = task;
+    let (policy, objective, samples) = (inputs.policy, inputs.objective, inputs.samples);
     let actions = policy.spec().action;
-    let log_std = &task.parameters[policy.log_std_range()];
+    let log_std = &inputs.parameters[policy.log_std_range()];
     let inverse_std: Vec<T> = log_std.iter().map(|&s| (-s).exp()).collect();
     let mut z = vec![T::ZERO; actions];
     let mut terms = LossTerms::default();
     let rows = means
         .chunks_exact(actions)
         .zip(delta.chunks_exact_mut(actions));
-    for ((mean, delta), &i) in rows.zip(task.indices) {
+    for ((mean, delta), &i) in rows.zip(inputs.indices) {
         let action = row(samples.actions, i, actions);
         for (((z, &a), &m), &s) in z.iter_mut().zip(action).zip(mean).zip(&inverse_std) {
             *z = (a - m) * s;
         }
+        // r = π(a|s)/π_old(a|s), from the difference of log-probabilities: densities themselves over- and underflow.
         let log_ratio = standardised_log_prob(&z, log_std) - samples.log_probs[i as usize];
-        let by_log_prob = surrogate(
-            log_ratio,
-            samples.advantages[i as usize],
-            objective.clip,
-            &mut terms,
-        );
-        let by_log_prob = by_log_prob * T::from_f64(task.weight);
+        let advantage = samples.advantages[i as usize];
+        let by_log_prob = surrogate(log_ratio, advantage, objective.clip, &mut terms);
+        let by_log_prob = by_log_prob * T::from_f64(inputs.weight);
+        // With z = (a − μ)/σ: ∂ log π/∂μ = z/σ and ∂ log π/∂ log σ = z² − 1.
         for ((d, &z), &s) in delta.iter_mut().zip(&z).zip(&inverse_std) {
             *d = by_log_prob * z * s;
         }
@@ -266,14 +247,20 @@ fn policy_terms<T: Scalar>(
                 *g += by_log_prob * (z * z - T::ONE);
             }
         }
-        terms.action_bound += action_bound(mean, objective, task.weight, delta);
+        terms.action_bound += action_bound(mean, objective, inputs.weight, delta);
     }
     if objective.learn_std {
-        let share =
-            T::from_f64(objective.entropy_coefficient * task.weight * task.indices.len() as f64);
-        log_std_gradient.iter_mut().for_each(|g| *g = *g - share);
+        reward_entropy(inputs, log_std_gradient);
     }
     terms
+}
+
+/// Adds the gradient of the entropy's share of the loss. The entropy is Σ log σ and a constant, so each log σ has slope 1; it is
+/// rewarded, hence the minus.
+fn reward_entropy<T: Scalar>(inputs: Inputs<T>, log_std_gradient: &mut [T]) {
+    let samples = inputs.indices.len() as f64;
+    let share = T::from_f64(inputs.objective.entropy_coefficient * inputs.weight * samples);
+    log_std_gradient.iter_mut().for_each(|g| *g = *g - share);
 }
 
 /// Adds one sample's terms, and returns the derivative of its surrogate by the log-probability.
@@ -284,10 +271,12 @@ fn surrogate<T: Scalar>(log_ratio: T, advantage: T, clip: f64, terms: &mut LossT
     let clipped = if clipped > high { high } else { clipped };
     let plain = ratio * advantage;
     let held = clipped * advantage;
+    // exp(x) − 1 − x loses all its digits near x = 0, where most ratios are; `exp_m1` keeps them.
     terms.approx_kl += log_ratio.to_f64().exp_m1() - log_ratio.to_f64();
     if clipped != ratio {
         terms.clip_fraction += 1.0;
     }
+    // min(r·A, clip(r)·A): where the clipped branch is the smaller one, moving r further earns nothing and has no slope.
     if held < plain {
         terms.policy -= held.to_f64();
         T::ZERO

@@ -32,7 +32,7 @@ struct Experience<T> {
     returns: Vec<T>,
 }
 
-fn judged<T: Scalar>(learner: &Learner<T>, observations: &[T]) -> Vec<T> {
+fn valued<T: Scalar>(learner: &Learner<T>, observations: &[T]) -> Vec<T> {
     let mut workspace = ActWorkspace::default();
     let values = learner
         .policy()
@@ -54,7 +54,7 @@ impl<T: Scalar> Experience<T> {
         Self {
             actions: acted.actions.to_vec(),
             log_probs: log_probs.map(|(&l, s)| l + T::from_f64(0.3) * s).collect(),
-            values: judged(learner, &observations),
+            values: valued(learner, &observations),
             advantages: normal(samples, rng),
             returns: normal(samples, rng),
             observations,
@@ -353,7 +353,7 @@ fn a_simple_task_is_learned() {
         experience.returns = rewards.map(|(o, a)| reward(o, a)).collect();
         experience.actions = acted.actions.to_vec();
         experience.log_probs = acted.log_probs.to_vec();
-        experience.values = judged(&learner, &experience.observations);
+        experience.values = valued(&learner, &experience.observations);
         let pairs = experience.returns.iter().zip(&experience.values);
         experience.advantages = pairs.map(|(r, v)| r - v).collect();
         learner.update(&experience.batch(), &mut rng).unwrap();
@@ -367,7 +367,7 @@ fn a_simple_task_is_learned() {
 
 /// Rollouts may be cut into groups of environments in any way.
 #[test]
-fn the_size_of_the_batch_acted_on_or_judged_changes_no_bit() {
+fn the_size_of_the_batch_acted_on_or_valued_changes_no_bit() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for (observation, action) in [(220, 28), (5, 3), (258, 21)] {
         let spec = PolicySpec {

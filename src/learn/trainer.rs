@@ -1,11 +1,15 @@
 //! A training run: rollouts, advantages, updates, in iterations that read top to bottom.
 
+use super::batch::Batch;
+use super::error::{LearnError, check_length};
+use super::gae::{Trajectories, advantages};
+use super::normalizer::{Normalizer, OBSERVATION_LIMIT};
+use super::policy::PolicySpec;
+use super::ppo::{Learner, LearnerState};
 use super::random::stream;
 use super::rollout::{Actor, Buffer, EpisodeTotals, Group};
-use super::{
-    Batch, LearnError, Learner, LearnerState, Normalizer, OBSERVATION_LIMIT, PolicySpec,
-    TrainerSettings, Trajectories, UpdateStats, advantages,
-};
+use super::settings::TrainerSettings;
+use super::stats::UpdateStats;
 use crate::task::{StartDistribution, Task, size};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,7 +19,9 @@ use std::sync::Arc;
 /// What an iteration did.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Metrics {
+    /// Iterations done, this one included.
     pub iteration: u64,
+    /// Control steps taken so far by all environments together.
     pub samples: u64,
     /// Mean sum of rewards over the episodes that ended; `None` where none did.
     #[serde(rename = "return")]
@@ -26,21 +32,25 @@ pub struct Metrics {
     pub episode_length: Option<f64>,
     /// Episodes that ended.
     pub episodes: u64,
+    /// How the update went.
     #[serde(flatten)]
     pub update: UpdateStats,
     /// Standard deviation of the action noise.
     pub action_std: f64,
-    /// Mean of each reward term over all steps.
+    /// Mean of each reward term over all steps, by its name.
     pub reward_terms: BTreeMap<String, f64>,
 }
 
 /// What a run is between two rounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainerState {
+    /// Iterations done.
     pub iteration: u64,
+    /// Parameters and optimiser.
     pub learner: LearnerState<f32>,
+    /// Statistics of the observations.
     pub normalizer: Normalizer,
-    /// What was seen of each part of the motions, which decides where episodes begin.
+    /// Control steps, then failures, of each bin of the [`StartDistribution`]; empty in runs that are older than it.
     pub starts: Vec<f32>,
 }
 
@@ -73,7 +83,7 @@ impl Trainer {
     /// A trainer that hasn't learned anything yet.
     ///
     /// # Errors
-    /// A setting out of its range.
+    /// A setting out of its range, or a network of no size or too large.
     pub fn new(settings: TrainerSettings, task: Arc<dyn Task>) -> Result<Self, LearnError> {
         settings.check()?;
         let spec = PolicySpec {
@@ -141,6 +151,7 @@ impl Trainer {
         self.iteration.is_multiple_of(self.settings.round.max(1))
     }
 
+    /// Everything that must be saved to go on later.
     pub fn state(&self) -> TrainerState {
         TrainerState {
             iteration: self.iteration,
@@ -157,7 +168,7 @@ impl Trainer {
     pub fn restore(&mut self, state: TrainerState) -> Result<(), LearnError> {
         // Runs from before starts were counted have none.
         if !state.starts.is_empty() {
-            super::check_length("saved starts", state.starts.len(), 2 * self.starts.bins())?;
+            check_length("saved starts", state.starts.len(), 2 * self.starts.bins())?;
             self.starts.restore(&state.starts);
         }
         self.learner.restore(state.learner)?;
@@ -167,7 +178,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// Plays, learns, and says how it went. Runs on the current rayon pool, with the same bits at any size of it.
+    /// Collects samples, learns from them, and says how it went. Runs on the current rayon pool, with the same bits at any size of it.
     ///
     /// # Errors
     /// A quantity that stopped being finite.
@@ -175,16 +186,16 @@ impl Trainer {
         self.schedule_rate();
         let std = self.schedule_noise();
         if self.normalizer.count == 0.0 {
-            self.meet_observations()?;
+            self.warm_up_normalizer()?;
         }
-        self.play()?;
-        self.gather()?;
+        self.collect()?;
+        self.assemble_batch()?;
         // Before anything is learned from them: this is where a number that isn't finite is named.
         for group in &self.groups {
             self.normalizer.update(&group.buffer.raw)?;
         }
         self.starts
-            .learn(self.groups.iter().map(|group| &group.buffer.tally));
+            .update(self.groups.iter().map(|group| &group.buffer.tally));
         let batch = Batch {
             observations: &self.batch.observations,
             actions: &self.batch.actions,
@@ -206,6 +217,7 @@ impl Trainer {
         (self.samples() as f64 / self.settings.samples.max(1) as f64).min(1.0)
     }
 
+    /// Where no KL divergence sets the learning rate, it changes evenly over the samples.
     fn schedule_rate(&mut self) {
         if self.settings.ppo.target_kl.is_some() {
             return;
@@ -215,6 +227,7 @@ impl Trainer {
             .set_learning_rate(self.settings.ppo.learning_rate * share);
     }
 
+    /// Standard deviation of the action noise in this iteration. Where it isn't learned, it changes evenly over the samples.
     fn schedule_noise(&mut self) -> f64 {
         let done = self.done();
         let std = self.settings.ppo.initial_std * (1.0 + (self.settings.final_std - 1.0) * done);
@@ -225,9 +238,9 @@ impl Trainer {
         std
     }
 
-    /// Plays once without learning, so that the first samples are normalised like all later ones.
-    fn meet_observations(&mut self) -> Result<(), LearnError> {
-        self.play()?;
+    /// Collects samples once without learning, so that the first samples are normalised like all later ones.
+    fn warm_up_normalizer(&mut self) -> Result<(), LearnError> {
+        self.collect()?;
         for group in &self.groups {
             self.normalizer.update(&group.buffer.raw)?;
         }
@@ -235,9 +248,11 @@ impl Trainer {
         Ok(())
     }
 
-    fn play(&mut self) -> Result<(), LearnError> {
+    /// Takes the iteration's steps in all environments, a group per piece of parallel work.
+    fn collect(&mut self) -> Result<(), LearnError> {
         if self.is_between_rounds() || self.stale {
-            // A state from within a round is played on from streams that no round has.
+            // A run that was saved within a round (when its samples were used up) begins episodes from streams that no round
+            // has: those of the inverted seed.
             let (seed, part) = match self.is_between_rounds() {
                 true => (
                     self.settings.seed,
@@ -263,7 +278,8 @@ impl Trainer {
             .try_for_each(|group| group.collect(steps, &actor))
     }
 
-    fn gather(&mut self) -> Result<(), LearnError> {
+    /// Joins the groups' samples, always in the order of the groups, and computes advantages and returns.
+    fn assemble_batch(&mut self) -> Result<(), LearnError> {
         let batch = &mut self.batch;
         for values in [
             &mut batch.observations,
@@ -292,14 +308,10 @@ impl Trainer {
                 final_values: &from.final_values,
                 next_values: &from.next_values,
             };
-            let (advantage, value) = (&mut batch.advantages[start..], &mut batch.returns[start..]);
-            advantages(
-                &rollout,
-                self.settings.ppo.gamma,
-                self.settings.ppo.lambda,
-                advantage,
-                value,
-            )?;
+            let ppo = &self.settings.ppo;
+            let advantage = &mut batch.advantages[start..];
+            let returns = &mut batch.returns[start..];
+            advantages(&rollout, ppo.gamma, ppo.lambda, advantage, returns)?;
         }
         Ok(())
     }

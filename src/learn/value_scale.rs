@@ -3,22 +3,25 @@
 use super::kernels::Scalar;
 use super::policy::Policy;
 
-/// How much of the newest batch enters the running statistics, once there were enough batches.
+/// Share of the newest batch in the running statistics, once there were 1/rate batches: a memory of about 20 batches. Chosen.
 const RATE: f64 = 0.05;
-/// Returns that vary less than this count as varying this much.
+/// Returns that vary less than this count as varying this much, so that a constant return isn't divided by 0. Chosen.
 const SMALLEST_STD: f64 = 1e-3;
 
-/// Running statistics of returns.
+/// Running statistics of returns (van Hasselt et al. 2016, "Learning values across many orders of magnitude").
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ValueScale {
+    /// Mean return.
     pub mean: f64,
     /// Mean of the squared return.
     pub square: f64,
+    /// Batches taken in.
     pub batches: f64,
 }
 
 impl ValueScale {
-    /// Takes in a batch: the plain mean over batches at first, an exponential one later.
+    /// Takes in a batch: the plain mean over batches at first, an exponential one later. An exponential mean alone would
+    /// take 20 batches to forget where it began.
     pub(crate) fn follow<T: Scalar>(&mut self, returns: &[T]) {
         let (mean, std) = mean_and_std(returns);
         self.batches += 1.0;
@@ -35,7 +38,7 @@ impl ValueScale {
     }
 
     /// Writes the scale into the parameter vector and rewrites the critic's last layer so that values stay:
-    /// `w' = w·σ/σ'`, `b' = (σ·b + μ − μ')/σ'`.
+    /// `w' = w·σ/σ'`, `b' = (σ·b + μ − μ')/σ'` (van Hasselt et al. 2016, Algorithm 1).
     pub(crate) fn apply<T: Scalar>(&self, policy: &Policy, parameters: &mut [T]) {
         let (mean_index, std_index) = (policy.value_mean_index(), policy.value_std_index());
         let (old_mean, old_std) = (
@@ -50,6 +53,7 @@ impl ValueScale {
         let Some(last) = policy.critic.layers().last() else {
             return;
         };
+        // As rounded to the parameters' precision, for these are the numbers that values are computed with.
         let (new_mean, new_std) = (new_mean.to_f64(), new_std.to_f64());
         for w in &mut critic[last.weight.clone()] {
             *w = T::from_f64(w.to_f64() * old_std / new_std);

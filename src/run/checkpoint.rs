@@ -20,14 +20,17 @@ const POLICY: Format = Format {
     remedy: "train it again",
 };
 
-/// All that a resumed run needs to go on with the same bits. Numbers that must be exact lie in tensors, not in JSON.
-/// Random streams aren't among it: they follow from the seed and the iteration.
+/// All that a resumed run needs to go on with the same bits. Numbers that must be exact are tensors, not JSON. It holds no
+/// random streams, for these follow from the seed and the iteration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
+    /// Iterations done.
     pub iteration: u64,
     /// Environment steps learned from.
     pub samples: u64,
+    /// Parameters and optimiser.
     pub learner: LearnerState<f32>,
+    /// Statistics of the observations.
     pub normalizer: Normalizer,
     /// Other state of the run, by name: flat vectors.
     pub tensors: BTreeMap<String, Vec<f32>>,
@@ -36,9 +39,11 @@ pub struct Checkpoint {
 /// A policy that can act: parameters and observation statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolicyFile {
+    /// Shape of the networks.
     pub spec: PolicySpec,
     /// In the order of [`Policy::tensors`].
     pub parameters: Vec<f32>,
+    /// Statistics of the observations.
     pub normalizer: Normalizer,
     /// What the observations and actions mean, as JSON.
     pub details: Value,
@@ -60,7 +65,7 @@ struct PolicyHeader {
 }
 
 impl Checkpoint {
-    /// Replaces `path` at once: a run that dies while saving keeps its last checkpoint.
+    /// Writes to `path` in one step: a run that is killed while saving keeps its last checkpoint.
     ///
     /// # Errors
     /// A file that can't be written, or parameters that don't fit the network.
@@ -149,7 +154,7 @@ impl Checkpoint {
 }
 
 impl PolicyFile {
-    /// Replaces `path` at once.
+    /// Writes to `path` in one step.
     ///
     /// # Errors
     /// A file that can't be written, or parameters that don't fit the network.
@@ -195,7 +200,7 @@ impl PolicyFile {
 /// What the names of a checkpoint's other tensors begin with.
 const EXTRA: &str = "extra.";
 
-/// A network that can't be, or that doesn't fit its parameters.
+/// The error of a file whose network is impossible or doesn't fit its parameters.
 fn misfit(error: LearnError) -> Flaw {
     Flaw::content("policy", error.to_string())
 }

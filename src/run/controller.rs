@@ -1,4 +1,4 @@
-//! A trained policy with all that it needs to act: no exploration, no learning.
+//! A trained policy with all that it needs to act. It takes mean actions, without noise, and learns nothing.
 
 use crate::evaluate::Agent;
 use crate::learn::{
@@ -20,7 +20,9 @@ pub struct Controller {
 /// Buffers of one episode.
 #[derive(Default)]
 pub struct Memory {
+    /// The observation.
     seen: Vec<f32>,
+    /// The same, normalised.
     normal: Vec<f32>,
     workspace: ActWorkspace<f32>,
 }

@@ -30,9 +30,9 @@ pub enum RunError {
     Exists(PathBuf),
     /// A folder that isn't a run.
     NoRun(PathBuf),
-    /// A run that hasn't been saved yet.
+    /// A run without a policy: it was never saved.
     NoPolicy(PathBuf),
-    /// A file of the run that says something impossible.
+    /// A file of the run whose content can't be used.
     Config {
         /// The file.
         path: PathBuf,
@@ -45,7 +45,7 @@ pub enum RunError {
     Motion(MotionError),
     /// A character that can't be used.
     Skeleton(SkeletonError),
-    /// Settings or motions that make no task.
+    /// Settings or motions from which no task can be built.
     Task(TaskError),
     /// Learning that can't begin or go on.
     Learn(LearnError),
@@ -73,7 +73,7 @@ impl From<EvaluateError> for RunError {
 }
 
 impl RunError {
-    /// Whether a setting of the plan is at fault, so that the file or flag it came from is to be named.
+    /// Whether a setting of the plan is at fault, so that the caller should say where it came from.
     pub fn is_setting(&self) -> bool {
         match self {
             Self::Task(error) => error.is_setting(),

@@ -1,4 +1,4 @@
-//! How well a run performs its motions.
+//! The evaluation of a run: how well its policy performs each of its motions.
 
 use super::error::RunError;
 use super::files;
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 pub struct CaseEvaluation {
     /// Name of the motion.
     pub motion: String,
-    /// Length of an episode from the first frame.
+    /// Length of an episode from the first frame, seconds.
     pub seconds: f64,
     /// What was measured.
     #[serde(flatten)]
@@ -56,7 +56,7 @@ impl CaseEvaluation {
         }
     }
 
-    /// The same as the text of a file.
+    /// The same JSON as the text of a file.
     pub fn text(results: &[Self]) -> String {
         format!("{:#}\n", Self::json(results))
     }

@@ -2,11 +2,11 @@
 
 /// Everything that decides what the run learns; every run has it, from its first moment.
 pub const CONFIG: &str = "config.json";
-/// A line per iteration.
+/// What each iteration did, a line of JSON each.
 pub const METRICS: &str = "metrics.jsonl";
 /// All that a resumed run needs to go on.
 pub const CHECKPOINT: &str = "checkpoint.safetensors";
-/// All that it takes to act.
+/// All that the policy needs to act.
 pub const POLICY: &str = "policy.safetensors";
 /// How well the finished run performs, with the default options.
 pub const EVALUATION: &str = "eval.json";

@@ -40,7 +40,7 @@ struct PolicyDetails {
     observation: Vec<Block>,
 }
 
-/// A run on disk.
+/// A training run on disk.
 pub struct Run {
     dir: PathBuf,
     plan: Plan,
@@ -52,7 +52,7 @@ pub struct Run {
 const STARTS: &str = "starts";
 
 impl Run {
-    /// Makes a run in the folder `dir`, which is created. What can't be trained leaves no folder behind.
+    /// Makes a run in the folder `dir`, which is created. A plan that can't be trained leaves no folder behind.
     ///
     /// # Errors
     /// A folder that holds a run already or can't be written, or a plan, a character or motions that can't be trained.
@@ -97,35 +97,11 @@ impl Run {
         if !path.exists() {
             return Err(RunError::NoRun(dir.to_owned()));
         }
-        let text = read(&path)?;
-        let config: Value = serde_json::from_str(&text).map_err(|e| corrupt(&path, e))?;
-        // A newer version may have other fields, so this comes first.
-        if (&config["format"], &config["version"]) != (&json!("run"), &json!(1)) {
-            let reason = format!(
-                "format {} {} is not known to this version",
-                config["format"], config["version"]
-            );
-            return Err(RunError::Config { path, reason });
-        }
-        // From the text, whose lines an error names.
-        let config: RunConfig = serde_json::from_str(&text).map_err(|e| corrupt(&path, e))?;
-        config.plan.check().map_err(|e| RunError::Config {
-            path: path.clone(),
-            reason: e.to_string(),
-        })?;
+        let config = config(&path)?;
         let mjcf = read(&dir.join(files::SKELETON))?;
         let slots = read(&dir.join(files::SLOTS))?;
         let mut motions = Vec::new();
         for name in &config.motions {
-            let plain = Path::new(name)
-                .file_name()
-                .is_some_and(|file| file == name.as_str());
-            if !plain {
-                return Err(RunError::Config {
-                    path,
-                    reason: format!("motion `{name}` is not a plain file name"),
-                });
-            }
             motions.push(Motion::load(dir.join(name))?);
         }
         Ok(Run {
@@ -141,7 +117,7 @@ impl Run {
         &self.dir
     }
 
-    /// What it learns, and how.
+    /// What the run learns, and how.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -151,12 +127,12 @@ impl Run {
         &self.skeleton
     }
 
-    /// The motions that it learns.
+    /// The motions that the run learns.
     pub fn motions(&self) -> &[Motion] {
         &self.motions
     }
 
-    /// A trainer that goes on where the last checkpoint was saved, or starts.
+    /// A trainer that goes on from the last checkpoint, or begins if there is none.
     ///
     /// # Errors
     /// A plan that can't be trained, or a broken checkpoint.
@@ -183,7 +159,7 @@ impl Run {
         Ok(trainer)
     }
 
-    /// Saves checkpoint and policy, each replaced at once.
+    /// Saves checkpoint and policy, each in one step.
     ///
     /// # Errors
     /// A folder that can't be written; the last good files stay.
@@ -233,7 +209,7 @@ impl Run {
             .map_err(unwritten(&path))
     }
 
-    /// Seconds of training so far, as the last line of `metrics.jsonl` tells.
+    /// Seconds of training so far, from the last line of `metrics.jsonl`; 0 before there is one.
     pub fn seconds(&self) -> f64 {
         let text = fs::read_to_string(self.dir.join(files::METRICS)).unwrap_or_default();
         let last = text.lines().last();
@@ -242,7 +218,7 @@ impl Run {
             .unwrap_or(0.0)
     }
 
-    /// Writes a file of the run, such as `eval.json`, replaced at once.
+    /// Writes a file of the run, such as `eval.json`, in one step.
     ///
     /// # Errors
     /// A file that can't be written.
@@ -268,7 +244,7 @@ impl Run {
         Ok(Controller::new(spec, parameters, &file.normalizer, task)?)
     }
 
-    /// Drops the lines of iterations that the checkpoint doesn't know.
+    /// Drops the metrics of iterations after the checkpoint, which will be done again.
     fn trim_metrics(&self, iteration: u64) -> Result<(), RunError> {
         let path = self.dir.join(files::METRICS);
         if !path.exists() {
@@ -288,7 +264,7 @@ impl Run {
     }
 }
 
-/// The task that these settings make of a character and its motions.
+/// The task with these settings, for a character and its motions.
 fn build(
     settings: &TaskSettings,
     skeleton: &Skeleton,
@@ -298,7 +274,7 @@ fn build(
     Ok(settings.build(model, motions)?)
 }
 
-/// Whether a plan can be trained: everything that training needs is tried but the environments.
+/// Checks that a plan can be trained: builds everything that training needs except the environments, which take longest.
 fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), RunError> {
     plan.check()?;
     let task = build(&plan.task, skeleton, motions)?;
@@ -312,11 +288,41 @@ fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), Run
     Ok(())
 }
 
+/// Reads and checks the `config.json` at `path`.
+fn config(path: &Path) -> Result<RunConfig, RunError> {
+    let wrong = |reason: String| RunError::Config {
+        path: path.to_owned(),
+        reason,
+    };
+    let text = read(path)?;
+    let fields: Value = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
+    // A newer version may have other fields, so this comes first.
+    let (format, version) = (&fields["format"], &fields["version"]);
+    if (format, version) != (&json!("run"), &json!(1)) {
+        return Err(wrong(format!(
+            "format {format} {version} is not known to this version"
+        )));
+    }
+    // From the text and not from `fields`, so that an error names the line.
+    let config: RunConfig = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
+    config.plan.check().map_err(|e| wrong(e.to_string()))?;
+    // A run can be moved, and must not read files outside its folder.
+    for name in &config.motions {
+        let file = Path::new(name).file_name();
+        if file.is_none_or(|file| file != name.as_str()) {
+            return Err(wrong(format!("motion `{name}` is not a plain file name")));
+        }
+    }
+    Ok(config)
+}
+
+/// The error of a file that can't be written.
 fn unwritten(path: &Path) -> impl FnOnce(std::io::Error) -> RunError {
     let path = path.to_owned();
     move |source| RunError::Write { path, source }
 }
 
+/// The error of a file that isn't the JSON that it should be.
 fn corrupt(path: &Path, error: serde_json::Error) -> RunError {
     RunError::Config {
         path: path.to_owned(),

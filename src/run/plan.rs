@@ -1,4 +1,4 @@
-//! What a run is told.
+//! The plan of a run: what it learns, and how.
 
 use super::error::RunError;
 use crate::learn::{Activation, PpoConfig, TrainerSettings};
@@ -56,6 +56,8 @@ impl JsonSchema for Plan {
 }
 
 impl Default for Plan {
+    /// Chosen so that a kick or a walk is learned in minutes on two cores; `docs/notebook/training-choices.md` has what other
+    /// networks, horizons and noise would change.
     fn default() -> Self {
         Self {
             seed: 1,
@@ -75,7 +77,7 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// The part that says how to learn.
+    /// The settings of the trainer.
     pub fn trainer(&self) -> TrainerSettings {
         TrainerSettings {
             seed: self.seed,

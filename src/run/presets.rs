@@ -10,10 +10,13 @@ use crate::task::{
 /// A plan with a name.
 #[derive(Clone, Copy, Debug)]
 pub struct Preset {
+    /// Its name on the command line.
     pub name: &'static str,
+    /// What it is, in a line.
     pub about: &'static str,
     /// The character that it is meant for.
     pub skeleton: &'static str,
+    /// Makes the plan.
     pub plan: fn() -> Plan,
 }
 
@@ -50,6 +53,7 @@ pub fn preset(name: &str) -> Option<&'static Preset> {
     PRESETS.iter().find(|preset| preset.name == name)
 }
 
+/// A preset names the terms that its publication has; all others are off.
 const NO_WEIGHTS: Rewards = Rewards {
     kernels: Kernels::Tracking,
     pose: 0.0,
@@ -64,8 +68,8 @@ const NO_WEIGHTS: Rewards = Rewards {
     com_position: 0.0,
 };
 
-/// What is asked for in Peng et al. 2018, "DeepMimic: example-guided deep reinforcement learning of physics-based character
-/// skills", as its published program asks for it.
+/// The task of Peng et al. 2018, "DeepMimic: example-guided deep reinforcement learning of physics-based character skills", as
+/// its published program has it.
 fn deepmimic_task() -> ImitationSettings {
     ImitationSettings {
         // 30 Hz as published; our drives are stable at 240 Hz, theirs needed 1200.
@@ -98,7 +102,7 @@ fn deepmimic() -> Plan {
     Plan {
         task: deepmimic_task().into(),
         samples: 6_000_000,
-        // Such kernels pay for the last millimetres, which noise hides.
+        // Such kernels reward the last millimetres, which noise hides; `docs/notebook/deepmimic-reward.md` compares it with 0.4.
         final_std: 0.15,
         ..Plan::default()
     }

@@ -1,4 +1,4 @@
-//! The training of a run: rounds, each saved at its end, and an evaluation when all is learned.
+//! The training of a run, round after round: each is saved at its end, and an evaluation follows the last.
 
 use super::error::RunError;
 use super::evaluation::CaseEvaluation;
@@ -37,7 +37,7 @@ pub struct Session {
 /// What an iteration did, and when: a line of `metrics.jsonl`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Iteration {
-    /// What the trainer says.
+    /// What the trainer reports.
     #[serde(flatten)]
     pub metrics: Metrics,
     /// Seconds of training up to here, all sessions of the run together.
@@ -56,7 +56,7 @@ struct Clock {
 }
 
 impl Session {
-    /// Goes on with a run where its last checkpoint was saved, or starts it.
+    /// Goes on with a run from its last checkpoint, or begins it if there is none.
     ///
     /// # Errors
     /// A plan that can't be trained, or a broken checkpoint.
@@ -81,7 +81,7 @@ impl Session {
         &self.run
     }
 
-    /// The run in memory.
+    /// What the run has learned so far, in memory.
     pub fn trainer(&self) -> &Trainer {
         &self.trainer
     }
@@ -107,7 +107,7 @@ impl Session {
         Ok(iteration)
     }
 
-    /// Trains to the end of the round and saves. Gives what its iterations did.
+    /// Trains to the end of the round and saves. Returns what its iterations did.
     ///
     /// # Errors
     /// As [`Session::iterate`] and [`Session::save`].
@@ -120,7 +120,7 @@ impl Session {
         Ok(round)
     }
 
-    /// Saves checkpoint and policy, each replaced at once. The evaluation and the recording of an older policy are removed,
+    /// Saves checkpoint and policy, each in one step. The evaluation and the recording of an older policy are removed,
     /// so that finding them means that the run was finished.
     ///
     /// # Errors

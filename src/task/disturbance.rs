@@ -55,7 +55,8 @@ impl Default for Perturbations {
 }
 
 impl Perturbations {
-    /// Shoves that a standing person meets with a step, a tenth of the weight, a third of the friction.
+    /// Moderate disturbances: shoves that a standing person answers with a step, a tenth of the mass, 30 % of the friction. Chosen;
+    /// `docs/notebook/shoves.md` has what agents make of them and of larger ones.
     pub fn usual() -> Self {
         Self {
             push_m_s: [0.2, 0.6],
@@ -87,14 +88,17 @@ impl Perturbations {
 pub(super) struct Disturbance {
     ranges: Perturbations,
     rng: ChaCha8Rng,
-    /// Seconds from the start.
+    /// When the next shove is due, seconds from the start.
     next_push: f64,
     was_pushed: bool,
+    /// Factor on all masses and inertias.
     pub mass: f32,
+    /// Factor on the friction with the ground.
     pub friction: f32,
 }
 
 impl Disturbance {
+    /// Draws what disturbs an episode; `seed` alone says how.
     pub fn new(ranges: Perturbations, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (mass, friction) = (
@@ -124,13 +128,13 @@ impl Disturbance {
         Some(Vector3::new(way.cos(), way.sin(), 0.0) * size)
     }
 
-    /// Whether the reference follows the agent by now.
-    pub fn is_followed(&self) -> bool {
+    /// Whether the reference follows the agent from now on: it does once the agent was shoved.
+    pub fn is_agent_followed(&self) -> bool {
         self.ranges.follow && self.was_pushed
     }
 }
 
-/// Uniform, from the upper 24 bits.
+/// Uniform in [low, high), from the upper 24 bits: as many as an `f32` can tell apart.
 fn within([low, high]: [f32; 2], rng: &mut ChaCha8Rng) -> f32 {
     let share = (rng.next_u32() >> 8) as f32 / (1u32 << 24) as f32;
     low + (high - low) * share

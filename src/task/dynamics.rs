@@ -6,11 +6,11 @@ use nalgebra::{Matrix3, Vector3};
 /// Centre of mass and momentum of the whole character.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dynamics {
-    /// Metres.
+    /// Centre of mass, metres, world axes.
     pub com: Vector3<f32>,
-    /// m/s.
+    /// Velocity of the centre of mass, m/s, world axes.
     pub com_velocity: Vector3<f32>,
-    /// About the centre of mass, each link's own spin included, kg·m²/s.
+    /// Angular momentum about the centre of mass, each link's own spin included, kg·m²/s, world axes.
     pub angular_momentum: Vector3<f32>,
 }
 
@@ -47,6 +47,7 @@ impl Masses {
             about_origin += turn * (inertia * turn.inverse_transform_vector(&state.angular))
                 + at.cross(&v) * *mass;
         }
+        // One pass: momenta about the world's origin first, then Σ (c − C) × m (v − V) = Σ c × m v − C × M V.
         com /= self.total;
         velocity /= self.total;
         let angular_momentum = about_origin - com.cross(&velocity) * self.total;

@@ -34,10 +34,10 @@ pub trait Task: Send + Sync {
     /// Control steps per second.
     fn control_hz(&self) -> f64;
 
-    /// The parts of what the policy sees, in order.
+    /// The blocks of an observation, in order.
     fn observation(&self) -> &[Block];
 
-    /// The parts of what the policy does, in order. There may be more numbers than joints.
+    /// The blocks of an action, in order. There may be more numbers than joints.
     fn action(&self) -> &[Block];
 
     /// Names of the reward terms, at most [`super::MAX_TERMS`].
@@ -49,7 +49,7 @@ pub trait Task: Send + Sync {
     /// Where episodes start before anything was learned.
     fn starts(&self) -> StartDistribution;
 
-    /// What it can be asked to perform; at least one case.
+    /// What an agent can be asked to perform; at least one case.
     fn cases(&self) -> &[Case];
 
     /// A new environment in which the first case is about to begin.
@@ -70,20 +70,20 @@ pub trait Environment: Send {
     /// Starts an episode outside training.
     fn start_at(&mut self, start: &EpisodeStart);
 
-    /// Takes what a player asks for.
+    /// Takes what a player or a script asks for.
     ///
     /// # Errors
-    /// An input that the task doesn't have.
+    /// An input that the task doesn't understand, such as a case that it doesn't have.
     fn input(&mut self, input: Input) -> Result<(), TaskError>;
 
     /// Writes what the policy sees; `out` is as long as [`Task::observation`] says.
     fn observe(&self, out: &mut [f32]);
 
-    /// The first half of a control step: aims the drives as `action` says, and pushes whoever is to be pushed.
+    /// The first half of a control step: aims the drives as `action` says, and applies a shove if one is due.
     fn begin_step(&mut self, action: &[f32]);
 
-    /// The second half, after the physics step: what it has led to. In training, `draws` decides what comes next where the
-    /// task goes on with something else.
+    /// The second half, after the physics step: rewards it and says how the episode stands. In training, `draws` decides what
+    /// the task goes on with.
     fn end_step(&mut self, stepped: Result<(), Diverged>, draws: Option<&mut Draws>) -> Step;
 
     /// The simulated character.
@@ -92,7 +92,7 @@ pub trait Environment: Send {
     /// The simulated character, to be stepped between the halves of a control step.
     fn world_mut(&mut self) -> &mut World;
 
-    /// Where in the task's motions the episode stands, for counting where it fails.
+    /// Where in the task's motions the episode is, for counting where episodes fail.
     fn moment(&self) -> Moment;
 
     /// Seconds since the episode began.
@@ -101,7 +101,7 @@ pub trait Environment: Send {
     /// Control steps from here to the end of the task or the time limit, whichever is nearer.
     fn possible_steps(&self) -> f64;
 
-    /// Whether an [`Input::Case`] hasn't been reached yet.
+    /// Whether the transition that an [`Input::Case`] asked for hasn't begun yet.
     fn is_changing(&self) -> bool;
 
     /// What the agent should be like now, where the task has a reference.
@@ -113,10 +113,10 @@ pub trait Environment: Send {
     /// One per [`Task::contact_bodies`]: whether the agent presses on the ground with it.
     fn touching(&self) -> &[bool];
 
-    /// What the drives are aimed at, one per link.
+    /// Targets of the drives, one per link.
     fn targets(&self) -> &[Target];
 
-    /// Impulse of the push on the trunk that the last step began with, N·s, world axes.
+    /// Impulse of the shove on the trunk that the last step began with, N·s, world axes.
     fn push(&self) -> Option<Vector3<f32>>;
 }
 
@@ -130,8 +130,8 @@ pub fn step(environment: &mut dyn Environment, action: &[f32]) -> Step {
 /// An environment that steps together with others, and in training what its episode draws from.
 pub type Stepping<'a> = (&'a mut dyn Environment, Option<Draws<'a>>);
 
-/// Takes one control step in environments of one task, each by its own of `actions`, `[environments, action]`: each as if
-/// alone, in less time.
+/// Takes one control step in environments of one task, with `actions` `[environments, action]`. Each gets the bits that it would
+/// get alone, in less time.
 ///
 /// # Panics
 /// If `actions` can't be shared evenly between the environments.

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 pub struct Frame {
     /// Time in the task's motion, seconds.
     pub time: f64,
-    /// Links of the agent.
+    /// The agent, one state per link.
     pub agent: Vec<LinkState>,
     /// What the agent should be like, where the task has a reference.
     pub reference: Option<ReferenceState>,
@@ -22,7 +22,7 @@ pub struct Frame {
     pub terms: TermValues,
     /// In [0, 1].
     pub reward: f32,
-    /// Impulse of the push on the trunk that the step began with, N·s, world axes.
+    /// Impulse of the shove on the trunk that the step began with, N·s, world axes.
     pub push: Option<Vector3<f32>>,
 }
 
@@ -35,7 +35,7 @@ pub struct Episode {
     pub control_hz: f64,
     /// The end of every control step.
     pub frames: Vec<Frame>,
-    /// Steps of an episode without failure; in a sequence those of the cases that were begun.
+    /// Steps that the episode would have without a failure; in a sequence, those of the cases that were begun.
     pub possible: usize,
     /// Frames before a failure; if there is one, the last frame shows it.
     pub survived: usize,
@@ -70,7 +70,7 @@ impl Episode {
         (self.survived as f64 / self.possible.max(1) as f64).min(1.0)
     }
 
-    /// Sum of the rewards over the steps of an episode without failure.
+    /// Sum of the rewards, divided by the steps that the episode would have without a failure: from 0 to 1.
     pub fn normalized_return(&self) -> f64 {
         let sum: f64 = self.frames.iter().map(|f| f64::from(f.reward)).sum();
         sum / self.possible.max(1) as f64
@@ -108,13 +108,13 @@ impl Measure {
         }
     }
 
-    /// Says which values are good, and in which unit.
+    /// The same measure with its unit, and with which values are good.
     #[must_use]
     pub fn good(self, good: Good, unit: Unit) -> Self {
         Self { unit, good, ..self }
     }
 
-    /// The same for disturbed agents, too.
+    /// The same measure, which also means something for disturbed agents.
     #[must_use]
     pub fn holding_disturbed(self) -> Self {
         Self {

@@ -15,7 +15,7 @@ pub enum TaskError {
     Motion(MotionError),
     /// A setting out of its range.
     Setting(OutOfRange),
-    /// A reward term with a weight that the reward doesn't have.
+    /// A weight for a reward term that the kernels don't have.
     NoSuchTerm {
         /// Name of the term.
         term: &'static str,
@@ -43,7 +43,7 @@ pub enum TaskError {
     },
     /// No motion at all.
     NoMotion,
-    /// A case that the task hasn't.
+    /// A case that the task doesn't have.
     NoSuchCase {
         /// Its number, from 0.
         number: usize,

@@ -6,39 +6,46 @@ use crate::sim::{Character, Link, LinkState};
 use crate::skeleton::{GRAVITY, Shape, Skeleton};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Points this little above the lowest one are of the sole, metres.
+/// Points at most this far above the lowest one belong to the sole, metres. Chosen.
 const SOLE: f64 = 0.01;
 
 /// A round end or a corner of a foot's shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolePoint {
+    /// Number of the link that it belongs to.
     pub link: usize,
     /// In the link's frame, metres.
     pub center: Vector3<f32>,
+    /// Of the ball about the centre, metres; 0 for a corner.
     pub radius: f32,
 }
 
 /// What every environment of a run shares: skeleton, character and the bodies of interest.
 #[derive(Clone, Debug)]
 pub struct CharacterModel {
+    /// The character as its file describes it, with the slots of a humanoid.
     pub skeleton: Skeleton,
+    /// The same as the links that the physics moves.
     pub character: Character,
     /// Bodies whose positions the observation holds: head, hands and feet where the skeleton has them.
     pub key_bodies: Vec<usize>,
     /// Hands and feet where the skeleton has them.
     pub end_bodies: Vec<usize>,
+    /// The chest where the skeleton has one.
     pub chest_body: Option<usize>,
     /// Heel, left of the toes, right of the toes, of each foot.
     pub soles: Vec<SolePoint>,
-    /// What each link counts for where joints are weighted: all joints together one.
+    /// One per link: how much its joint counts where joints are weighted. The weights of all joints add up to 1.
     pub joint_weights: Vec<f32>,
-    /// What divides angular momentum: mass × leg length × √(g × leg length), kg·m²/s.
+    /// What angular momentum is divided by, so that it has no unit and doesn't grow with the character: mass × leg length × √(g × leg length), kg·m²/s.
     pub momentum_scale: f32,
 }
 
 impl CharacterModel {
+    /// What a task needs to know of this skeleton.
+    ///
     /// # Errors
-    /// A skeleton that can't be simulated.
+    /// A skeleton that can't be simulated, or one without legs, whose size can't be told.
     pub fn new(skeleton: Skeleton) -> Result<Self, TaskError> {
         let character = Character::new(&skeleton)?;
         let ends = [
@@ -80,12 +87,13 @@ impl CharacterModel {
         bodies.map(|b| self.character.body_pose(links, b).translation.vector)
     }
 
-    /// The body that is pushed: the chest, or the root where the skeleton has none.
+    /// The body that is shoved: the chest, or the root where the skeleton has none.
     pub fn trunk(&self) -> usize {
         self.chest_body.unwrap_or(0)
     }
 }
 
+/// The sole points of both feet.
 fn soles(skeleton: &Skeleton, character: &Character) -> Vec<SolePoint> {
     let rest = skeleton.forward(&skeleton.rest_qpos());
     let feet = [Slot::LeftFoot, Slot::RightFoot];
@@ -141,6 +149,7 @@ fn joint_weights(skeleton: &Skeleton, character: &Character) -> Vec<f32> {
     below.iter().map(|weight| weight / sum).collect()
 }
 
+/// The weight of the joint above the body in this slot, before weights are divided by their sum.
 fn joint_weight(slot: Slot) -> f32 {
     use Slot::*;
     match slot {

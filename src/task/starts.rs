@@ -4,16 +4,17 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
-/// A motion is cut into this many bins, or more so that none is longer than [`LONGEST_BIN`].
+/// A motion is cut into this many bins, or into more so that none is longer than [`LONGEST_BIN`]. Chosen, as are the numbers
+/// below; `docs/notebook/adaptive-starts.md` has what they gain together.
 const BINS: f64 = 10.0;
-/// Seconds.
+/// Longest bin, seconds.
 const LONGEST_BIN: f64 = 1.0;
-/// A start answers for failures within this many seconds.
+/// A start counts as the cause of failures within this many seconds.
 const AHEAD: f64 = 1.0;
-/// Time constant in which what was seen fades, samples.
+/// Time constant with which counts fade, samples, so that failures that were overcome are forgotten.
 const MEMORY: f64 = 1e5;
-/// Seconds of the average that each bin is thought to have been seen before, so that a bin that is hardly ever visited
-/// isn't judged by chance.
+/// Seconds of average failure that each bin is taken to have been seen for beforehand, so that chance doesn't decide about a bin
+/// that is hardly ever visited.
 const PRIOR: f64 = 10.0;
 
 /// What [`StartDistribution`] needs to know of a motion. A task without motions has one span, of no length.
@@ -71,25 +72,27 @@ impl Tally {
 #[derive(Clone, Debug)]
 pub struct StartDistribution {
     bins: Vec<Bin>,
-    /// Of each motion, and the first bin of it.
+    /// Each motion, with the number of its first bin.
     motions: Vec<(Span, usize)>,
     anywhere: bool,
     share: f64,
     control_dt: f64,
-    /// Fading sums over the samples.
+    /// Control steps in each bin, fading with [`MEMORY`].
     steps: Vec<f32>,
+    /// Failures in each bin, fading alike.
     failures: Vec<f32>,
-    /// Of each bin and those before it.
+    /// Likelihoods of each bin and those before it, summed.
     cumulative: Vec<f64>,
 }
 
 impl StartDistribution {
-    /// Begins at the first frame of a motion unless `anywhere`; `share` of the starts follow the failures.
+    /// Starts in motions of these spans, before anything has failed: at the first frame unless `anywhere`. A `share` of them,
+    /// 0 to 1, leads to likely failures. A control step takes `control_dt` seconds.
     pub fn new(spans: &[Span], anywhere: bool, share: f64, control_dt: f64) -> Self {
         let (mut bins, mut motions) = (Vec::new(), Vec::new());
         for (motion, span) in spans.iter().enumerate() {
             motions.push((*span, bins.len()));
-            bins.extend(cut(motion, span, bins.len(), anywhere));
+            bins.extend(bins_of(motion, span, bins.len(), anywhere));
         }
         let mut starts = StartDistribution {
             steps: vec![0.0; bins.len()],
@@ -101,11 +104,11 @@ impl StartDistribution {
             share,
             control_dt,
         };
-        starts.weigh();
+        starts.update_weights();
         starts
     }
 
-    /// Into how many bins the motions are cut.
+    /// Number of bins that all motions together are cut into.
     pub fn bins(&self) -> usize {
         self.bins.len()
     }
@@ -144,8 +147,8 @@ impl StartDistribution {
         Moment { motion, time }
     }
 
-    /// Takes in what happened in an iteration, from all groups.
-    pub fn learn<'a>(&mut self, tallies: impl Iterator<Item = &'a Tally>) {
+    /// Takes in the tallies of an iteration.
+    pub fn update<'a>(&mut self, tallies: impl Iterator<Item = &'a Tally>) {
         let (mut steps, mut failures) = (vec![0_u32; self.bins()], vec![0_u32; self.bins()]);
         for tally in tallies {
             for (sums, counts) in [(&mut steps, &tally.steps), (&mut failures, &tally.failures)] {
@@ -158,7 +161,7 @@ impl StartDistribution {
             let fade = |(sum, count): (&mut f32, u32)| *sum = kept * *sum + count as f32;
             sums.iter_mut().zip(counts).for_each(fade);
         }
-        self.weigh();
+        self.update_weights();
     }
 
     /// Steps, then failures, of each bin.
@@ -166,7 +169,7 @@ impl StartDistribution {
         [&self.steps[..], &self.failures].concat()
     }
 
-    /// Goes on from a state of the same motions.
+    /// Goes on from the [`StartDistribution::state`] of the same motions.
     ///
     /// # Panics
     /// If the state has another number of bins.
@@ -174,10 +177,10 @@ impl StartDistribution {
         let (steps, failures) = state.split_at(self.bins());
         self.steps.copy_from_slice(steps);
         self.failures.copy_from_slice(failures);
-        self.weigh();
+        self.update_weights();
     }
 
-    /// Failures per second of each bin.
+    /// Failures per second in each bin: counts and the prior's [`PRIOR`] seconds at the mean rate of all bins.
     fn hazards(&self) -> Vec<f64> {
         let sum = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>();
         let seconds = sum(&self.steps) * self.control_dt;
@@ -189,18 +192,22 @@ impl StartDistribution {
         self.steps.iter().zip(&self.failures).map(hazard).collect()
     }
 
-    fn weigh(&mut self) {
+    /// Computes how likely each bin is as a start: (1 − share) × evenly over motions and their time, and share × evenly weighted
+    /// by the failures that are expected ahead.
+    fn update_weights(&mut self) {
         let hazards = self.hazards();
         let expected = |bin: &Bin| -> f64 {
             let ahead = bin.ahead.iter();
             ahead.map(|&(j, seconds)| hazards[j] * seconds).sum()
         };
+        // A long motion has many bins, so each of them counts for less: motions are drawn equally often.
         let even = |bin: &Bin| {
-            let reach = reach(&self.motions[bin.motion].0);
+            let reach = start_range(&self.motions[bin.motion].0);
             bin.length / (reach * self.motions.len() as f64)
         };
         let likely: Vec<f64> = self.bins.iter().map(|b| even(b) * expected(b)).collect();
         let all: f64 = likely.iter().sum();
+        // Nothing has failed yet: all starts are even.
         let share = if all > 0.0 { self.share } else { 0.0 };
         let mut sum = 0.0;
         self.cumulative.clear();
@@ -211,23 +218,23 @@ impl StartDistribution {
     }
 }
 
-/// Uniform in [0, 1), from the upper 53 bits.
+/// Uniform in [0, 1), from the upper 53 bits: as many as an `f64` can tell apart.
 pub(super) fn uniform(rng: &mut ChaCha8Rng) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// Seconds of a motion in which episodes begin.
-fn reach(span: &Span) -> f64 {
+fn start_range(span: &Span) -> f64 {
     span.last_start.max(f64::MIN_POSITIVE)
 }
 
 /// The bins of a motion, the first of which has number `first`.
-fn cut(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin> {
+fn bins_of(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin> {
     let count = match anywhere {
-        true => (reach(span) / LONGEST_BIN).ceil().max(BINS) as usize,
+        true => (start_range(span) / LONGEST_BIN).ceil().max(BINS) as usize,
         false => 1,
     };
-    let length = reach(span) / count as f64;
+    let length = start_range(span) / count as f64;
     let bin = |i: usize| Bin {
         motion,
         from: i as f64 * length,
@@ -240,7 +247,8 @@ fn cut(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin> {
     (0..count).map(bin).collect()
 }
 
-/// Bins passed within [`AHEAD`] from the middle of bin `i` on, or else from its start, and for how long each.
+/// The bins that an episode passes within [`AHEAD`] seconds, and how many seconds it spends in each: from the middle of bin `i`
+/// on, or from its start where not `middle`.
 fn ahead(i: usize, count: usize, length: f64, middle: bool, wraps: bool) -> Vec<(usize, f64)> {
     let mut seconds = vec![0.0; count];
     let (mut left, mut here) = (AHEAD, if middle { length / 2.0 } else { length });
@@ -287,7 +295,7 @@ mod tests {
         tally.clear(starts.bins());
         tally.steps.fill(1800);
         tally.failures[starts.bin(moment)] = failures;
-        starts.learn(std::iter::once(&tally));
+        starts.update(std::iter::once(&tally));
     }
 
     #[test]

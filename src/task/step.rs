@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Most reward terms that a task can have.
 pub const MAX_TERMS: usize = 16;
 
-/// Values of a task's reward terms, in the order of [`Task::reward_terms`].
+/// Values of a task's reward terms, in the order of [`Task::reward_terms`](super::Task::reward_terms).
 pub type TermValues = ArrayVec<f32, MAX_TERMS>;
 
 /// One named part of an observation or an action.
@@ -58,7 +58,7 @@ pub struct EpisodeStart {
     pub case: usize,
     /// In which state the agent starts.
     pub state: StartState,
-    /// By which ranges the episode is disturbed, and the seed that decides how.
+    /// The ranges of the disturbances, if there are any, and the seed that decides which the episode gets.
     pub disturbance: Option<(Perturbations, u64)>,
 }
 
@@ -86,9 +86,9 @@ pub enum StartState {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Input {
-    /// Go over into the case of this number where that fits best within the next second.
+    /// Begin the transition into the case of this number at the best moment of the next second.
     Case(usize),
-    /// Push the trunk at the beginning of the next control step: an impulse in world axes, N·s.
+    /// Shove the trunk at the beginning of the next control step: an impulse in world axes, N·s.
     Push(Vector3<f32>),
 }
 
@@ -101,7 +101,7 @@ pub enum Outcome {
     Failed(Failure),
     /// Terminal: the task was performed to its end.
     Finished,
-    /// Cut off by the time limit; the state is still worth what would have been earned from it.
+    /// Cut off by the time limit. The state keeps its value: the episode could have gone on.
     TimeLimit,
 }
 
@@ -111,7 +111,7 @@ pub enum Outcome {
 pub enum Failure {
     /// The agent strayed too far from its reference.
     Distance,
-    /// A body that has no business on the ground touched it.
+    /// A body touched the ground that the reference never puts there.
     Fall,
     /// The reward fell below the threshold.
     Reward,
@@ -130,12 +130,12 @@ pub struct Step {
     pub outcome: Outcome,
 }
 
-/// The reference at one time; by default there is nothing in it.
+/// What the agent should be like at one moment; empty by default.
 #[derive(Clone, Debug, Default)]
 pub struct ReferenceState {
     /// One per link of the character.
     pub links: Vec<LinkState>,
-    /// Of the whole reference character.
+    /// Centre of mass and momenta of the reference.
     pub dynamics: Dynamics,
     /// One per [`super::Task::contact_bodies`]: whether the reference stands on the ground with it.
     pub contacts: Vec<bool>,

@@ -5,7 +5,7 @@ use crate::sim::{Character, HingeAxis, LinkJoint, LinkState, Target};
 use crate::skeleton::Drive;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Writes the targets that `action` stands for, one per link, while the reference is at `wanted`.
+/// Writes the targets that `action` stands for, one per link; `wanted` is the reference at the next control step.
 pub(super) fn aim(
     actions: Actions,
     character: &Character,
@@ -28,10 +28,10 @@ pub(super) fn aim(
     }
 }
 
-/// The reference's own rotation, turned on by the action.
+/// The reference's own joint rotation, and on top of it the action's.
 ///
-/// A drive kp (q* − q) − kd ω trails a moving reference by kd/kp · ω; so the target leads by as much, which is a
-/// velocity feed-forward with position drives alone.
+/// A drive kp (q* − q) − kd ω trails a target that moves at ω by kd/kp · ω. So the target leads the reference by as much,
+/// which is feed-forward of the velocity with position drives alone.
 fn residual(
     character: &Character,
     wanted: &[LinkState],
@@ -50,7 +50,7 @@ fn residual(
         LinkJoint::Free => Target::Free,
         LinkJoint::Ball { drives, .. } | LinkJoint::Hinges { drives, .. } => {
             let lead = Vector3::from_fn(|k, _| lag(&drives[k]) * rate[k]);
-            let added = turned(joint, action) * scale;
+            let added = rotation_vector(joint, action) * scale;
             Target::Ball(turn * UnitQuaternion::from_scaled_axis(lead + added))
         }
         LinkJoint::Hinge { axis, drive } => {
@@ -62,17 +62,18 @@ fn residual(
     }
 }
 
-/// How far beyond a hinge's range its drive may aim, radians: to press against the end of the range, or to hold a
-/// load near it. `skeletons/humanoid.xml` has the same in its control ranges.
+/// How far beyond a hinge's range its drive may aim, radians: to press against the end of the range, or to hold a load near
+/// it. Chosen; `skeletons/humanoid.xml` has the same in its control ranges.
 const BEYOND_LIMIT: f32 = 0.5;
 
+/// The angle, limited to where a hinge's drive may aim, radians.
 fn within_reach(axis: &HingeAxis, angle: f32) -> f32 {
     let [low, high] = axis.limit.map(|end| end as f32);
     angle.clamp(low - BEYOND_LIMIT, high + BEYOND_LIMIT)
 }
 
-/// Rotation vector in the link's frame that the action of a joint with several coordinates stands for.
-fn turned(joint: &LinkJoint, action: &[f32]) -> Vector3<f32> {
+/// Rotation vector, in the link's frame, that the action of a joint with several coordinates stands for.
+fn rotation_vector(joint: &LinkJoint, action: &[f32]) -> Vector3<f32> {
     match joint {
         LinkJoint::Hinges { hinges, .. } => hinges
             .iter()
@@ -92,7 +93,7 @@ fn lag(drive: &Drive) -> f32 {
     }
 }
 
-/// Where `place` puts each coordinate, given its range and the action.
+/// A target that doesn't depend on the reference: `place` maps a coordinate's range and its action to an angle, radians.
 fn absolute(joint: &LinkJoint, action: &[f32], place: impl Fn([f32; 2], f32) -> f32) -> Target {
     let place = |limit: &[f64; 2], a: f32| place(limit.map(|end| end as f32), a);
     match joint {

@@ -1,11 +1,12 @@
-//! What is left of the pose and speed of a motion while another takes over: every joint's offset from the new motion,
-//! which fades (inertialisation: Bollo, "Inertialization", Game Developers Conference 2018; here along cubics).
+//! The offsets that carry a character from one motion into another: each joint begins where the old motion had it and fades
+//! into the new one. Only the new motion has to be played meanwhile (inertialisation: Bollo, "Inertialization", Game Developers
+//! Conference 2018; here along cubics).
 
 use crate::sim::{Character, LinkState};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
-/// Seconds in which the offsets fade.
-const FADES: f64 = 0.4;
+/// Seconds in which the offsets fade. Chosen.
+const FADE_S: f64 = 0.4;
 
 /// An offset and its rate: of the root's place, m, or of a rotation, rad, in the link's frame.
 #[derive(Clone, Copy, Debug)]
@@ -15,9 +16,10 @@ struct Offset {
 }
 
 impl Offset {
-    /// The cubic that begins with offset and rate and ends at rest, without any: after the share `u` of [`FADES`].
+    /// What is left after the share `u` of [`FADE_S`], on the cubic Hermite curve from this offset and rate to no offset at no
+    /// rate: x (1 − u)² (1 + 2u) + v T u (1 − u)².
     fn after(&self, u: f32) -> Offset {
-        let s = FADES as f32;
+        let s = FADE_S as f32;
         let left = 1.0 - u;
         Offset {
             at: self.at * (left * left * (1.0 + 2.0 * u)) + self.rate * (s * u * left * left),
@@ -35,7 +37,7 @@ pub(super) struct Blend {
 }
 
 impl Blend {
-    /// From where `present` has it, in a motion that begins with `begun`.
+    /// The offsets between `present`, where the old motion has the character, and `begun`, where the new one begins.
     pub fn between(character: &Character, present: &[LinkState], begun: &[LinkState]) -> Blend {
         let turn = |i: usize| {
             let (old, old_rate) = joint(character, present, i);
@@ -59,14 +61,16 @@ impl Blend {
         }
     }
 
-    /// Whether anything is left after so many seconds.
+    /// Whether any offset is left after so many seconds.
     pub fn lasts(&self, seconds: f64) -> bool {
-        seconds < FADES
+        seconds < FADE_S
     }
 
     /// Adds to `links`, which are those of the new motion, what is left after so many seconds.
     pub fn apply(&self, character: &Character, seconds: f64, links: &mut [LinkState]) {
-        let u = (seconds / FADES).clamp(0.0, 1.0) as f32;
+        let u = (seconds / FADE_S).clamp(0.0, 1.0) as f32;
+        // Joints are turned from the root outward: each link hangs on its parent as already moved, but the offset itself is
+        // from the new motion alone.
         let alone = links.to_vec();
         for (i, turn) in self.turns.iter().enumerate() {
             let turn = turn.after(u);
@@ -94,7 +98,8 @@ impl Blend {
     }
 }
 
-/// The link that hangs on `parent` at its point `joined`, turned by `rotation`, at a `rate` of its joint in its own frame.
+/// The link whose joint is at the point `joined` of its parent and at its own point `anchor` (both in link frames, metres),
+/// turned by `rotation` against the parent, at the joint's `rate`, rad/s in the link's own frame.
 fn hung(
     parent: &LinkState,
     joined: &Point3<f32>,
@@ -132,9 +137,11 @@ fn joint(
     )
 }
 
-/// Body angular velocity of exp(v) while v changes at `rate`: the right Jacobian of the rotation group times `rate`.
+/// Body angular velocity of exp(v) while v changes at `rate`: the right Jacobian of the rotation group times `rate` (Solà et
+/// al. 2018, "A micro Lie theory for state estimation in robotics", on SO(3)).
 fn right_jacobian(v: &Vector3<f32>, rate: &Vector3<f32>) -> Vector3<f32> {
     let angle = v.norm();
+    // Near 0 the closed form divides two tiny numbers; the next term of its series is below 1e-6 there.
     if angle < 1e-3 {
         return rate - v.cross(rate) * 0.5;
     }
@@ -144,13 +151,14 @@ fn right_jacobian(v: &Vector3<f32>, rate: &Vector3<f32>) -> Vector3<f32> {
         + v.cross(&once) * ((angle - angle.sin()) / (square * angle))
 }
 
-/// The rate of v at which exp(v) turns with body angular velocity `rate`.
+/// The rate of v at which exp(v) turns with body angular velocity `rate` (the inverse, there too).
 fn right_jacobian_inverse(v: &Vector3<f32>, rate: &Vector3<f32>) -> Vector3<f32> {
     let angle = v.norm();
     let once = v.cross(rate);
     if angle < 1e-3 {
         return rate + once * 0.5;
     }
+    // As 1/θ² − (1 + cos θ)/(2θ sin θ), rewritten with half the angle, whose sine is 0 only at 0 and at a full turn.
     let half = angle / 2.0;
     let share = (1.0 - half * half.cos() / half.sin().max(1e-3)) / (angle * angle);
     rate + once * 0.5 + v.cross(&once) * share

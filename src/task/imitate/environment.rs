@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 use rand_chacha::rand_core::Rng;
 use std::sync::Arc;
 
-/// A body this little above the lowest one stands with it, metres. Chosen: the soles of one character differ by less.
+/// A body at most this far above the lowest one stands on the ground too, metres. Chosen: the soles of one character differ by less.
 const STANDING: f64 = 0.01;
 
 /// Mean distance of the bodies from their reference beyond which an episode of an evaluation has failed, metres: the
@@ -30,7 +30,7 @@ const STANDING: f64 = 0.01;
 const LOST_M: f32 = 0.5;
 
 /// Seconds that an evaluation gives a motion beyond its own end, so that the motion ends the episode and not the clock.
-const ROOM_AT_THE_END_S: f64 = 1.0;
+const MARGIN_AT_END_S: f64 = 1.0;
 
 /// An environment of [`super::Imitate`].
 pub(super) struct Imitation {
@@ -49,18 +49,19 @@ pub(super) struct Imitation {
     dynamics: Dynamics,
     targets: Vec<Target>,
     last_action: Vec<f32>,
-    /// Per contact link of the reference.
+    /// Per contact link of the reference: whether the agent presses on the ground with it.
     touching: Vec<bool>,
     disturbance: Option<Disturbance>,
     /// Impulse that a player asked for, N·s.
     asked_push: Option<Vector3<f32>>,
-    /// Impulse of the push in the last step, N·s.
+    /// Impulse of the shove in the last step, N·s.
     push: Option<Vector3<f32>>,
-    /// Number of the motion that is imitated, and of the one that it is about to go over into.
+    /// Number of the motion that is imitated.
     motion: usize,
+    /// Number of the motion that a transition is planned into; the same where none is.
     upcoming: usize,
-    /// Seconds of the episode at which training goes over into another motion.
-    next_change: f64,
+    /// Seconds since the episode began at which training plans its next transition.
+    next_transition: f64,
 }
 
 impl Imitation {
@@ -95,7 +96,7 @@ impl Imitation {
             dynamics: Dynamics::default(),
             motion: 0,
             upcoming: 0,
-            next_change: f64::INFINITY,
+            next_transition: f64::INFINITY,
         };
         environment.reset(0.0);
         environment
@@ -109,6 +110,7 @@ impl Imitation {
     /// Starts an episode at the first frame of the present reference, but at rest: in the rest pose, on the ground where
     /// the reference's root is, facing where it faces.
     pub fn reset_at_rest(&mut self) {
+        // The lowest point of the rest pose comes to stand on the ground, and its root above the anchor of the reference.
         self.reset(0.0);
         let skeleton = &self.model.skeleton;
         let poses = skeleton.forward(&skeleton.rest_qpos());
@@ -133,6 +135,7 @@ impl Imitation {
         self.dynamics = reference.masses().dynamics(&states);
     }
 
+    /// Starts an episode in the state of `reference` at `time` seconds.
     fn begin(&mut self, reference: &Arc<Reference>, time: f64) {
         self.playback.begin(reference, time);
         self.elapsed = 0.0;
@@ -148,14 +151,14 @@ impl Imitation {
         self.look_ahead();
     }
 
-    /// Starts an episode of motion number `motion`; a start at rest takes its place from the first frame.
+    /// Starts an episode of motion number `motion`. A start at rest stands where the first frame does.
     fn begin_motion(&mut self, motion: usize, state: StartState) {
         (self.motion, self.upcoming) = (motion, motion);
         let reference = self.references[motion].clone();
         if let Purpose::Evaluation { seconds } = self.purpose {
             self.settings.episode_s = match reference.loop_mode() {
                 LoopMode::Wrap => seconds,
-                LoopMode::Clamp => reference.duration() + ROOM_AT_THE_END_S,
+                LoopMode::Clamp => reference.duration() + MARGIN_AT_END_S,
             };
         }
         let last = reference.last_start(self.settings.physics.control_dt());
@@ -175,19 +178,14 @@ impl Imitation {
         self.disturbance = Some(disturbance);
     }
 
-    /// Slows the present reference down for another `reference`, if that is slower, and goes over into it, as by
-    /// [`Imitation::change_to`], at the control step of the next second at which the present one comes nearest to it; at
-    /// once where the present one ends.
+    /// Plans the transition into another `reference`; see [`Playback::lead_to`].
     pub fn lead_to(&mut self, reference: &Arc<Reference>) {
         self.playback
             .lead_to(reference, self.settings.physics.control_dt());
         self.look_ahead();
     }
 
-    /// Goes on, as the agent is, with another `reference`: from the moment of it that is nearest to the present one, and
-    /// from where the present one has brought the character. Within 0.4 s its pose becomes that of the new reference, and
-    /// within a second its speed; the new one begins at half to one and a half of its own pace, so as to be as fast as the
-    /// present one, and follows the agent along the ground.
+    /// Begins the transition into another `reference` now; see [`Playback::change_to`].
     #[cfg(test)]
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         self.playback.change_to(reference);
@@ -196,44 +194,51 @@ impl Imitation {
 
     /// Steps of an episode that only the time limit ends.
     fn longest_steps(&self) -> f64 {
-        (self.settings.episode_s * self.settings.physics.control_hz - 1e-6)
+        self.steps_in(self.settings.episode_s)
+    }
+
+    /// Control steps within so many seconds, at least one; the last may be cut short. 1e-6 of a step is rounding error.
+    fn steps_in(&self, seconds: f64) -> f64 {
+        (seconds * self.settings.physics.control_hz - 1e-6)
             .ceil()
             .max(1.0)
     }
 
-    /// Least and most seconds between changes of the motion, where training has them.
+    /// Least and most seconds between transitions, where training has them.
     fn transitions_s(&self) -> Option<[f64; 2]> {
         let training = self.purpose == Purpose::Training && self.references.len() > 1;
         self.settings.transitions_s.filter(|_| training)
     }
 
-    /// Draws when training goes over into another motion, seconds from now.
-    fn plan_change(&mut self, draws: &mut Draws) {
+    /// Draws when the next transition of training is planned.
+    fn schedule_transition(&mut self, draws: &mut Draws) {
         if let Some([least, most]) = self.transitions_s() {
-            self.next_change = self.elapsed + (least + uniform(draws.rng) * (most - least));
+            self.next_transition = self.elapsed + (least + uniform(draws.rng) * (most - least));
         }
     }
 
-    /// In training, goes over into another motion when it is time for that, or where this one ends.
-    fn change_in_time(&mut self, outcome: Outcome, draws: &mut Draws) -> Outcome {
-        let due = outcome == Outcome::Running && self.elapsed >= self.next_change;
+    /// In training, plans the transition into another motion when one is due, or where this motion ends. The episode then goes
+    /// on.
+    fn plan_transition(&mut self, outcome: Outcome, draws: &mut Draws) -> Outcome {
+        let due = outcome == Outcome::Running && self.elapsed >= self.next_transition;
         if self.transitions_s().is_none() || !(due || outcome == Outcome::Finished) {
             return outcome;
         }
         self.upcoming = draws.starts.draw(draws.rng).motion;
         self.lead_to(&self.references[self.upcoming].clone());
         self.note_arrival();
-        self.plan_change(draws);
+        self.schedule_transition(draws);
         Outcome::Running
     }
 
+    /// Counts the next motion as the present one from the moment its transition begins.
     fn note_arrival(&mut self) {
         if !self.playback.is_leading() {
             self.motion = self.upcoming;
         }
     }
 
-    /// Pushes the trunk when the disturbance or a player wants that.
+    /// Shoves the trunk if the disturbance or a player asks for it; two shoves at once add up.
     fn push_trunk(&mut self) {
         let elapsed = self.elapsed;
         let mass = self.model.skeleton.total_mass() as f32;
@@ -249,14 +254,14 @@ impl Imitation {
         }
     }
 
-    /// Moves the reference to the agent along the ground: where a cycle begins, if cycles follow; from the first push on, if
-    /// the disturbance says so; and always once another motion has led into this one, for nobody can say beforehand how fast
-    /// a character gathers speed.
+    /// Moves the reference to the agent along the ground: where a cycle begins, if cycles follow; from the first shove on, if
+    /// the disturbance says so (`docs/notebook/shoves.md` has what that gains); and always after a transition, for nobody can say
+    /// beforehand how fast a character gathers speed (`docs/notebook/transitions.md`).
     fn follow(&mut self) {
         let dt = self.settings.physics.control_dt();
         let begins = self.settings.cycles_follow && self.playback.begins_cycle(dt);
         let disturbance = self.disturbance.as_ref();
-        let pushed = disturbance.is_some_and(Disturbance::is_followed);
+        let pushed = disturbance.is_some_and(Disturbance::is_agent_followed);
         if begins || pushed || self.playback.was_led_into() {
             let (mine, wanted) = (&self.world.states()[0], &self.next.links[0]);
             let apart = mine.pose.translation.vector - wanted.pose.translation.vector;
@@ -264,6 +269,7 @@ impl Imitation {
         }
     }
 
+    /// Samples the reference at the next control step and at the moments that the policy sees beyond it.
     fn look_ahead(&mut self) {
         let dt = self.settings.physics.control_dt();
         self.playback.sample(dt, &mut self.next);
@@ -273,6 +279,7 @@ impl Imitation {
         }
     }
 
+    /// How the episode stands after a step with this `reward`: failures first, for they hold at the end of a motion too.
     fn outcome(&self, reward: f32) -> Outcome {
         let (states, contacts) = (self.world.states(), self.world.contacts());
         let reference = self.playback.reference();
@@ -291,7 +298,8 @@ impl Imitation {
         }
     }
 
-    /// An agent that is measured has also failed where it is lost, whatever rules it was trained under.
+    /// The outcome by the rules of evaluation: whatever rules an agent was trained under, it has failed when its bodies are too
+    /// far from the reference.
     fn or_lost(&self, outcome: Outcome) -> Outcome {
         if self.purpose == Purpose::Training || matches!(outcome, Outcome::Failed(_)) {
             return outcome;
@@ -343,7 +351,7 @@ impl Environment for Imitation {
         if self.settings.perturbations.is_on() {
             self.disturb(self.settings.perturbations, draws.rng.next_u64());
         }
-        self.plan_change(draws);
+        self.schedule_transition(draws);
     }
 
     fn start_at(&mut self, start: &EpisodeStart) {
@@ -417,14 +425,15 @@ impl Environment for Imitation {
             .masses()
             .dynamics(self.world.states());
         let terms = self.compare();
-        let reward = terms.total(&self.settings.rewards);
+        let reward = terms.total(self.settings.rewards.weights());
         let mut outcome = self.outcome(reward);
+        // The reward compared the agent with the reference that it was asked to follow in this step; only now may that move.
         self.follow();
         self.playback.change_in_time();
         self.note_arrival();
         self.look_ahead();
         if let Some(draws) = draws {
-            outcome = self.change_in_time(outcome, draws);
+            outcome = self.plan_transition(outcome, draws);
         }
         Step {
             reward,
@@ -457,10 +466,7 @@ impl Environment for Imitation {
             return self.longest_steps();
         }
         let limit = self.settings.episode_s - self.elapsed;
-        let left = limit.min(self.playback.left());
-        (left * self.settings.physics.control_hz - 1e-6)
-            .ceil()
-            .max(1.0)
+        self.steps_in(limit.min(self.playback.left()))
     }
 
     fn is_changing(&self) -> bool {

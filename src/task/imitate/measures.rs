@@ -9,7 +9,7 @@ use crate::task::model::CharacterModel;
 use crate::task::step::{ReferenceState, StartState};
 use nalgebra::Vector3;
 
-/// Measures episodes of one case, a reference whose largest angular momentum is `largest_momentum`, kg·m²/s.
+/// Measures episodes of one case. `largest_momentum` is the largest angular momentum of its reference, kg·m²/s.
 pub fn measures(
     model: &CharacterModel,
     contact_links: &[usize],
@@ -90,7 +90,7 @@ fn errors_of_frames(
     ]
 }
 
-/// Contacts with the ground against the reference's, and the horizontal speed of what stands on it.
+/// How well contacts with the ground agree with the reference's, and how fast what stands on the ground slides along it.
 fn contacts(model: &CharacterModel, links: &[usize], episodes: &[Episode]) -> [Measure; 2] {
     [
         Measure::new("contact_f1", "contact F1", contact_f1(episodes))
@@ -104,8 +104,8 @@ fn contacts(model: &CharacterModel, links: &[usize], episodes: &[Episode]) -> [M
     ]
 }
 
-/// How far the roots of agent and reference turn in the episode from the first frame, about the axis about which the
-/// reference turns most.
+/// How far the roots of agent and reference turn in the episode that begins at the first frame, about the axis about which
+/// the reference turns most: whether a somersault went all the way round.
 fn turning(episodes: &[Episode]) -> [Measure; 2] {
     let from_start = |value: &dyn Fn(&Episode) -> f64| {
         let first = |e: &&Episode| e.start.state == StartState::Reference(0.0);
@@ -150,6 +150,7 @@ fn errors<'a>(
         .map(move |(p, q)| f64::from((p - q - shift).norm()))
 }
 
+/// Mean difference of the velocities of link origins, m/s.
 fn velocity_error(frame: &Frame, reference: &ReferenceState) -> f64 {
     let links = frame.agent.iter().zip(&reference.links);
     mean(links.map(|(a, b)| f64::from((a.linear - b.linear).norm())))
@@ -180,6 +181,7 @@ fn foot_skate(model: &CharacterModel, links: &[usize], episodes: &[Episode]) -> 
     }))
 }
 
+/// Horizontal speed of a link's sole, m/s.
 fn sole_speed(link: &Link, state: &LinkState) -> f64 {
     let twist = Twist {
         linear: state.linear.cast(),

@@ -10,6 +10,7 @@ mod clock;
 mod environment;
 mod measures;
 mod observe;
+mod placement;
 mod playback;
 mod reference;
 mod reward;
@@ -20,10 +21,10 @@ mod tests;
 mod transition;
 
 pub use observe::{ObservationInputs, layout, observation_size, observe};
+pub use placement::Placement;
 pub use reference::Reference;
 pub use reward::{Kernels, TERM_NAMES, Terms};
 pub use settings::{Actions, ImitationSettings, Observations, Rewards, Terminations};
-pub use transition::Placement;
 
 use super::environment::{Environment, Task};
 use super::episode::{Episode, Measure};

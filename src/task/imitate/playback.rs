@@ -1,4 +1,4 @@
-//! What an agent is to follow: a motion, how it is led into, and what comes next.
+//! What an agent is to follow: a motion, the transition by which it was entered, and the motion that comes next.
 
 use super::reference::Reference;
 use super::transition::Transition;
@@ -8,22 +8,23 @@ use crate::task::step::ReferenceState;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
-/// Seconds in which [`Playback::lead_to`] goes over.
-const WAITS: f64 = 1.0;
+/// Seconds in which [`Playback::lead_to`] looks for the best moment of a transition. Chosen.
+const SEARCH_S: f64 = 1.0;
 
 /// A motion at a moment of it.
 pub(super) struct Playback {
     model: Arc<CharacterModel>,
     reference: Arc<Reference>,
-    /// What leads into the reference.
+    /// How the reference was entered.
     transition: Transition,
-    /// What the reference goes over into, and how many seconds after this one began.
+    /// The next reference, and how many seconds after this one began it takes over.
     upcoming: Option<(f64, Arc<Reference>)>,
     /// Seconds since this reference began.
     passed: f64,
 }
 
 impl Playback {
+    /// Plays `reference` from its first frame.
     pub fn new(model: Arc<CharacterModel>, reference: Arc<Reference>) -> Self {
         Playback {
             model,
@@ -42,6 +43,7 @@ impl Playback {
         self.passed = 0.0;
     }
 
+    /// The motion that is played.
     pub fn reference(&self) -> &Arc<Reference> {
         &self.reference
     }
@@ -62,7 +64,7 @@ impl Playback {
         }
     }
 
-    /// Writes what is wanted in so many seconds.
+    /// Writes what is wanted of the agent `ahead` seconds from now.
     pub fn sample(&self, ahead: f64, sample: &mut ReferenceState) {
         let passed = self.passed + ahead;
         let (place, time) = (
@@ -71,23 +73,26 @@ impl Playback {
         );
         self.reference.sample_at(&place, time, sample);
         let character = &self.model.character;
+        // Blended links have momenta of their own.
         if self.transition.blend(character, passed, &mut sample.links) {
             sample.dynamics = self.reference.masses().dynamics(&sample.links);
         }
     }
 
-    /// Slows down for another `reference`, if that is slower, and goes over into it at the step, of `dt` seconds, of the next
-    /// second at which the present one comes nearest to it; at once where the present one ends.
+    /// Plans the transition into another `reference`: at the step (of `dt` seconds) of the next second at which the present one
+    /// comes nearest to it, or at once where the present one ends. Until then it slows down if the other one is slower.
     pub fn lead_to(&mut self, reference: &Arc<Reference>, dt: f64) {
         let mut sample = self.reference.blank();
         self.sample(0.0, &mut sample);
         let speed = ground_speed(&sample);
         let mut entry = reference.blank();
         reference.sample(reference.nearest(&sample), &mut entry);
+        // The speed of the new motion is that at its entry nearest to the present pose.
         self.transition
             .slow(self.passed, speed, ground_speed(&entry));
+        // Tries every step of the second, on the slowed clock; never past the end, where a motion only holds its last frame.
         let mut best = (f32::INFINITY, self.passed);
-        for step in 0..(WAITS / dt).round() as u32 {
+        for step in 0..(SEARCH_S / dt).round() as u32 {
             let passed = self.passed + f64::from(step) * dt;
             let time = self.transition.clock().time(passed);
             if step > 0 && self.reference.is_over(time) {
@@ -103,7 +108,7 @@ impl Playback {
         self.change_in_time();
     }
 
-    /// Whether [`Playback::lead_to`] hasn't led to its reference yet.
+    /// Whether a planned transition hasn't begun yet.
     pub fn is_leading(&self) -> bool {
         self.upcoming.is_some()
     }
@@ -119,17 +124,17 @@ impl Playback {
         self.reference.begins_cycle([before, self.time()])
     }
 
-    /// Whether another motion led into the present one.
+    /// Whether the present motion was entered from another one.
     pub fn was_led_into(&self) -> bool {
         self.transition.was_led_into()
     }
 
-    /// Moves the motion on along the ground.
+    /// Moves the motion along the ground, metres.
     pub fn shift(&mut self, by: Vector3<f32>) {
         self.transition.shift(by);
     }
 
-    /// Goes over where [`Playback::lead_to`] has planned to.
+    /// Begins the transition that [`Playback::lead_to`] has planned, once it is due.
     pub fn change_in_time(&mut self) {
         if let Some((passed, _)) = self.upcoming
             && self.passed >= passed - 1e-9
@@ -139,7 +144,7 @@ impl Playback {
         }
     }
 
-    /// Goes on with another `reference`, from the moment of it that is nearest to the present one.
+    /// Begins a transition into another `reference`, at the moment of it that is nearest to the present one.
     pub fn change_to(&mut self, reference: &Arc<Reference>) {
         let mut present = self.reference.blank();
         self.sample(0.0, &mut present);

@@ -1,6 +1,6 @@
 //! The reference motion as link states, at any time.
 
-use super::transition::Placement;
+use super::placement::{Placement, anchor, moved};
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
@@ -10,18 +10,21 @@ use crate::task::model::CharacterModel;
 use crate::task::step::ReferenceState;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-/// Link states between the table's frames are blended link by link, which shortens a limb that turns at ω by
-/// 1 − cos(ω/2f): at 120 Hz and 12 rad/s by a half per mille, in a table of a clip's own 16 Hz by 7 %.
+/// Frames per second that the table of link states has at least. Between its frames they are blended link by link, which
+/// shortens a limb that turns at ω by
+/// 1 − cos(ω/2f): at 12 rad/s by 0.1 % in a table of 120 Hz, and by 7 % in one of a clip's own
+/// 16 Hz.
 const TABLE_HZ: f64 = 120.0;
-/// The reference's velocities are means over so long on either side, seconds: what comes and goes within a step of control
-/// can't be followed, and in recordings is mostly noise.
-const AVERAGED: f64 = 1.0 / 30.0;
-/// Frames a second that [`Reference::distance`] looks at.
-const LOOKED_AT_HZ: f64 = 30.0;
+/// The reference's velocities are means over this many seconds on either side, one control step: no drive can follow what
+/// comes and goes faster, and in recordings it is mostly noise.
+const AVERAGED_S: f64 = 1.0 / 30.0;
+/// Frames per second that [`Reference::distance`] looks at. Chosen: it is asked at every step of a second.
+const SEARCH_HZ: f64 = 30.0;
 
 /// A motion ready to be imitated.
 #[derive(Clone, Debug)]
 pub struct Reference {
+    /// Name of the motion.
     pub name: String,
     /// Frames of the table per second.
     rate: f64,
@@ -33,7 +36,7 @@ pub struct Reference {
     start: Isometry3<f32>,
     contacts: Vec<Vec<bool>>,
     cycle: Cycle,
-    /// Of every frame, places and velocities of its links as [`upon_the_ground`] sees them.
+    /// For every frame, positions and velocities of its links as [`seen_from_root`] sees them.
     grounded: Vec<Vec<[Vector3<f32>; 2]>>,
     masses: Masses,
     /// Bodies that the motion puts on the ground.
@@ -43,6 +46,8 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// A motion as states of the links of `model`.
+    ///
     /// # Errors
     /// A motion of another skeleton, or of a single frame.
     pub fn new(motion: &Motion, model: &CharacterModel) -> Result<Self, TaskError> {
@@ -69,7 +74,7 @@ impl Reference {
             loop_mode: motion.loop_mode,
             duration,
             start: anchor(&frames[0][0].pose),
-            grounded: frames.iter().map(|links| upon_the_ground(links)).collect(),
+            grounded: frames.iter().map(|links| seen_from_root(links)).collect(),
             frames,
             contacts: times().map(contact).collect(),
             cycle: motion.cycle,
@@ -88,7 +93,7 @@ impl Reference {
         self.duration
     }
 
-    /// Latest start that leaves something to do in control steps of `control_dt` seconds.
+    /// Latest start, seconds, that leaves at least two control steps of `control_dt` seconds.
     pub fn last_start(&self, control_dt: f64) -> f64 {
         match self.loop_mode {
             LoopMode::Wrap => self.duration,
@@ -96,11 +101,12 @@ impl Reference {
         }
     }
 
+    /// Whether the motion repeats.
     pub fn loop_mode(&self) -> LoopMode {
         self.loop_mode
     }
 
-    /// Whether the motion has nothing more to show at `time`.
+    /// Whether the motion has ended at `time`, seconds. One that repeats never does.
     pub fn is_over(&self, time: f64) -> bool {
         self.loop_mode == LoopMode::Clamp && time >= self.duration - 1e-9
     }
@@ -140,6 +146,7 @@ impl Reference {
 
     /// The same at another place.
     pub fn sample_at(&self, place: &Placement, time: f64, sample: &mut ReferenceState) {
+        // A cycle that travels or turns begins where the one before it ended.
         let (cycle, within) = self.split(time);
         let at = within * self.rate;
         let last = self.frames.len() - 1;
@@ -171,16 +178,17 @@ impl Reference {
         self.entry(sample, 1).0
     }
 
-    /// How near this motion comes to `sample`, as in [`Reference::nearest`].
+    /// How near this motion comes to `sample`: the least of the sums that [`Reference::nearest`] compares, m².
     pub fn distance(&self, sample: &ReferenceState) -> f32 {
-        let step = (self.rate / LOOKED_AT_HZ).ceil().max(1.0);
+        let step = (self.rate / SEARCH_HZ).ceil().max(1.0);
         self.entry(sample, step as usize).1
     }
 
-    /// The best entry of every `step`th frame, seconds, and its distance.
+    /// The best entry among every `step`th frame, seconds, and its distance, m².
     fn entry(&self, sample: &ReferenceState, step: usize) -> (f64, f32) {
-        let wanted = upon_the_ground(&sample.links);
+        let wanted = seen_from_root(&sample.links);
         let distance = |links: &Vec<[Vector3<f32>; 2]>| -> f32 {
+            // Positions alone would enter a swinging leg on its way back. 0.01 s²: a difference of 1 m/s counts as 0.1 m. Chosen.
             let apart = |(a, b): (&[Vector3<f32>; 2], &[Vector3<f32>; 2])| {
                 (a[0] - b[0]).norm_squared() + 0.01 * (a[1] - b[1]).norm_squared()
             };
@@ -196,6 +204,7 @@ impl Reference {
         nearest.unwrap_or((0.0, f32::INFINITY))
     }
 
+    /// Number of the cycle at `time`, and seconds since it began.
     fn split(&self, time: f64) -> (i64, f64) {
         match self.loop_mode {
             LoopMode::Clamp => (0, time.clamp(0.0, self.duration)),
@@ -210,8 +219,8 @@ impl Reference {
     }
 }
 
-/// Place and velocity of each link, seen from the root's place on the ground and its heading.
-fn upon_the_ground(links: &[LinkState]) -> Vec<[Vector3<f32>; 2]> {
+/// Position (m) and velocity (m/s) of each link, from the point on the ground below the root, in axes along its heading.
+fn seen_from_root(links: &[LinkState]) -> Vec<[Vector3<f32>; 2]> {
     let into = anchor(&links[0].pose).inverse();
     let seen = |link: &LinkState| {
         let state = moved(link, &into);
@@ -220,25 +229,14 @@ fn upon_the_ground(links: &[LinkState]) -> Vec<[Vector3<f32>; 2]> {
     links.iter().map(seen).collect()
 }
 
-/// The place on the ground below a pose, facing where its x axis does.
-pub(super) fn anchor(pose: &Isometry3<f32>) -> Isometry3<f32> {
-    let at = pose.translation.vector;
-    Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), heading(&pose.rotation))
-}
-
-/// The part of a rotation about the vertical that carries x to where it points on the ground.
-pub(super) fn heading(turn: &UnitQuaternion<f32>) -> UnitQuaternion<f32> {
-    let forward = turn * Vector3::x();
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), forward.y.atan2(forward.x))
-}
-
 fn link_states(motion: &Motion, model: &CharacterModel, time: f64) -> Vec<LinkState> {
     let skeleton = &model.skeleton;
     let qpos = motion.sample_qpos(skeleton, time);
-    let qvel = motion.mean_qvel(time, AVERAGED);
+    let qvel = motion.mean_qvel(time, AVERAGED_S);
     model.character.states(skeleton, &qpos, &qvel)
 }
 
+/// The state between two frames of the table: `a` at `blend` 0, `b` at 1.
 fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {
     let at = a
         .pose
@@ -253,13 +251,5 @@ fn between(a: &LinkState, b: &LinkState, blend: f32) -> LinkState {
         pose: Isometry3::from_parts(Translation3::from(at), turn),
         linear: a.linear.lerp(&b.linear, blend),
         angular: a.angular.lerp(&b.angular, blend),
-    }
-}
-
-pub(super) fn moved(state: &LinkState, offset: &Isometry3<f32>) -> LinkState {
-    LinkState {
-        pose: offset * state.pose,
-        linear: offset.rotation * state.linear,
-        angular: offset.rotation * state.angular,
     }
 }

@@ -101,7 +101,7 @@ pub struct Rewards {
 }
 
 impl Rewards {
-    /// In the order of [`TERM_NAMES`].
+    /// All weights, in the order of [`TERM_NAMES`].
     pub fn weights(&self) -> [f32; TERM_NAMES.len()] {
         [
             self.pose,

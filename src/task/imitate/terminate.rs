@@ -14,7 +14,8 @@ pub fn furthest(links: &[LinkState], reference: &[LinkState]) -> f32 {
         .fold(0.0, f32::max)
 }
 
-/// `contacts` holds one flag per link, `allowed` the links that may stand on the ground.
+/// Which of the rules an agent has broken, if any. `contacts` holds one flag per link, `allowed` the links that may touch the
+/// ground, and `reward` is that of the step.
 pub fn failure(
     rules: &Terminations,
     links: &[LinkState],
@@ -42,7 +43,7 @@ pub fn failure(
         .map(|_| Failure::Reward)
 }
 
-/// Mean distance of the bodies from those of the reference, metres.
+/// Mean distance of all bodies, welded ones included, from those of the reference, metres.
 pub fn mean_distance(model: &CharacterModel, links: &[LinkState], reference: &[LinkState]) -> f32 {
     let sum: f32 = model
         .positions(links)

@@ -1,66 +1,37 @@
-//! How one motion goes over into another.
+//! The transition from one motion into another: where the new one is placed, how its speed adapts, and how its pose blends in.
 
 use super::blend::Blend;
-use super::clock::{Clock, EASES, left};
-use super::reference::{anchor, moved};
+use super::clock::{Clock, EASE_IN_S, left};
+use super::placement::{Placement, anchor};
 use crate::sim::{Character, LinkState};
 use crate::task::step::ReferenceState;
 use nalgebra::{Isometry3, Translation3, Vector3};
 
-/// A motion that goes slower than this stands, and no pace makes it go, m/s.
-const STANDS: f32 = 0.5;
+/// A motion slower than this stands, m/s, and no pace makes it walk. Chosen.
+const STANDING_M_S: f32 = 0.5;
 
-/// Where and how a motion is performed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
-    /// Carries the whole motion: a turn about the vertical and a shift along the ground.
-    pub pose: Isometry3<f32>,
-    /// What it slides at besides, m/s, world axes.
-    pub velocity: Vector3<f32>,
-    /// Seconds of the motion in a second.
-    pub pace: f32,
-}
-
-impl Placement {
-    /// Puts a link of the motion there.
-    pub(super) fn put(&self, link: &mut LinkState) {
-        *link = moved(link, &self.pose);
-        link.linear = link.linear * self.pace + self.velocity;
-        link.angular *= self.pace;
-    }
-
-    /// Where the motion itself has it.
-    pub fn own() -> Self {
-        Self {
-            pose: Isometry3::identity(),
-            velocity: Vector3::zeros(),
-            pace: 1.0,
-        }
-    }
-}
-
-/// What leads into a motion: its place, and what is left of the speed and the pose of the one before it.
+/// How a motion was entered: its place, and what is left of the speed and the pose of the motion before it.
 #[derive(Clone, Debug)]
 pub(super) struct Transition {
     place: Isometry3<f32>,
     clock: Clock,
-    /// How much faster the one before was than it is at the pace at which it begins, m/s, along the ground.
-    surplus: Vector3<f32>,
+    /// Velocity of the motion before, minus that of this one at the pace at which it begins, m/s along the ground, world axes.
+    excess: Vector3<f32>,
     blend: Option<Blend>,
 }
 
 impl Transition {
-    /// A motion that nothing leads into, from `time` seconds of it.
+    /// A motion that begins at its time `time`, seconds, without a transition.
     pub fn none(time: f64) -> Self {
         Self {
             place: Isometry3::identity(),
             clock: Clock::new(time, 1.0),
-            surplus: Vector3::zeros(),
+            excess: Vector3::zeros(),
             blend: None,
         }
     }
 
-    /// From where `present` has brought the character into a motion that is at `begun` at `time` seconds.
+    /// The transition of a character from `present` into another motion, which has the state `begun` at its `time`, seconds.
     pub fn between(
         character: &Character,
         present: &ReferenceState,
@@ -68,6 +39,8 @@ impl Transition {
         time: f64,
     ) -> Self {
         let place = anchor(&present.links[0].pose) * anchor(&begun.links[0].pose).inverse();
+        // Place and heading of the root carry on. Speeds along the ground are those of the centre of mass, which momentum keeps;
+        // the root sways about it. Pace takes up as much of the difference as it may, sliding what is left.
         let along = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
         let speed = along(present.dynamics.com_velocity);
         let own = along(place.rotation * begun.dynamics.com_velocity);
@@ -75,7 +48,7 @@ impl Transition {
         let mut transition = Self {
             place,
             clock,
-            surplus: speed - own * clock.pace(0.0) as f32,
+            excess: speed - own * clock.pace(0.0) as f32,
             blend: None,
         };
         let begins = transition.at(0.0);
@@ -85,21 +58,21 @@ impl Transition {
         transition
     }
 
-    /// How time goes in the motion.
+    /// How fast the motion is played.
     pub fn clock(&self) -> &Clock {
         &self.clock
     }
 
-    /// From so many seconds `passed` on, a motion at `speed`, m/s, slows down for one at another speed.
+    /// When so many seconds have `passed`, slows a motion at `speed`, m/s, down for another motion at the speed `other`, m/s.
     pub fn slow(&mut self, passed: f64, speed: f32, other: f32) {
-        // The speed at its own pace, and no pace makes a motion go that stands.
+        // The ratio of speeds, each at its motion's own pace; of a motion that stands there is none.
         let own = speed / self.clock.pace(passed) as f32;
-        let pace = if own > STANDS { other / own } else { 1.0 };
+        let pace = if own > STANDING_M_S { other / own } else { 1.0 };
         self.clock.slow(passed, f64::from(pace));
     }
 
-    /// Adds to the links of the motion as they are when so many seconds have `passed`, where it is performed, what is left
-    /// of the pose before it; tells whether anything is.
+    /// Adds what is left of the pose before the transition to the `links` of the motion when so many seconds have `passed`.
+    /// Returns whether anything was left.
     pub fn blend(&self, character: &Character, passed: f64, links: &mut [LinkState]) -> bool {
         let blend = self.blend.as_ref().filter(|blend| blend.lasts(passed));
         if let Some(blend) = blend {
@@ -108,34 +81,36 @@ impl Transition {
         blend.is_some()
     }
 
-    /// Whether another motion led into this one.
+    /// Whether the motion was entered from another one.
     pub fn was_led_into(&self) -> bool {
         self.blend.is_some()
     }
 
-    /// The same motion, moved on along the ground.
+    /// Moves the motion along the ground, metres; a vertical part of `by` is left out.
     pub fn shift(&mut self, by: Vector3<f32>) {
         let along = Vector3::new(by.x, by.y, 0.0);
         self.place = Translation3::from(along) * self.place;
     }
 
-    /// Where and at which pace the motion is performed when so many seconds have `passed`: it slides at Δv (1 − τ)², and has
-    /// so far gone Δv E/3 (1 − (1 − τ)³).
+    /// Where and at which pace the motion is performed when so many seconds have `passed`. With Δv the excess velocity, E the
+    /// time in which it fades and τ the share of E that has passed, the motion slides at Δv (1 − τ)² and has slid Δv E/3
+    /// (1 − (1 − τ)³) so far.
     pub fn at(&self, passed: f64) -> Placement {
         let left = left(passed) as f32;
-        let way = self.surplus * (EASES as f32 / 3.0 * (1.0 - left.powi(3)));
+        let way = self.excess * (EASE_IN_S as f32 / 3.0 * (1.0 - left.powi(3)));
         Placement {
             pose: Translation3::from(way) * self.place,
-            velocity: self.surplus * (left * left),
+            velocity: self.excess * (left * left),
             pace: self.clock.pace(passed) as f32,
         }
     }
 }
 
-/// The pace at which a motion at its `own` velocity is as fast as the one before it; the slowest if it goes the other way.
+/// The pace that makes a motion with its `own` velocity as fast as `speed`, m/s along the ground: 1 for a motion that stands,
+/// and 0, which the clock raises to the slowest, for one that goes the other way.
 fn pace(speed: &Vector3<f32>, own: &Vector3<f32>) -> f32 {
     let fast = own.norm();
-    if fast < STANDS {
+    if fast < STANDING_M_S {
         return 1.0;
     }
     if speed.dot(own) < 0.0 {

@@ -1,8 +1,8 @@
 //! The state of Peng et al. 2018, "DeepMimic", section 4, with rotations as two axes as in the authors' program: of 15
 //! bodies 227 numbers.
 
-use super::{ObservationInputs, Writer};
-use crate::task::imitate::reference::heading;
+use super::inputs::{ObservationInputs, Writer};
+use crate::task::imitate::placement::heading;
 use crate::task::model::CharacterModel;
 use nalgebra::Vector3;
 
@@ -18,13 +18,14 @@ pub(super) fn layout(model: &CharacterModel) -> Vec<(&'static str, usize)> {
     ]
 }
 
-/// Positions from the root; rotations as where their x and z axes point; velocities those in the world. All of it in
-/// axes that face where the root does.
+/// Positions from the root, rotations as the directions of their x and z axes, velocities against the world; all in axes along
+/// the root's heading.
 pub(super) fn observe(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
     let root = &scene.links[0].pose;
     let turn = heading(&root.rotation).inverse();
     let bodies =
         || (0..model.character.bodies.len()).map(|b| model.character.body_state(scene.links, b));
+    // From −1 to 1, about as large as the normalised observations beside it.
     w.one(2.0 * scene.next.phase - 1.0);
     w.one(root.translation.z);
     for body in bodies() {

@@ -1,11 +1,12 @@
 //! Our own observation: agent, errors and phase, in the root's frame.
 
-use super::{ObservationInputs, Writer};
+use super::inputs::{ObservationInputs, Writer};
 use crate::sim::LinkState;
 use crate::task::model::CharacterModel;
+use crate::task::step::ReferenceState;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// With `ahead` moments of the reference to come.
+/// The blocks of an observation that sees `ahead` moments of the reference beyond the next control step.
 pub(super) fn layout(
     model: &CharacterModel,
     contacts: usize,
@@ -44,15 +45,20 @@ pub(super) fn layout(
     blocks
 }
 
+/// The agent, its errors against the reference at the next control step, the phase, and the reference further ahead; all in the
+/// root's frame.
 pub(super) fn observe(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
-    let ObservationInputs {
-        links,
-        dynamics,
-        contacts,
-        next,
-        ahead,
-        ..
-    } = *scene;
+    agent(model, scene, w);
+    errors(model, scene, w);
+    phase(scene.next.phase, w);
+    for sample in scene.ahead {
+        further_ahead(model, &scene.links[0], sample, w);
+    }
+}
+
+/// The agent as it is: height and tilt of the root, speeds, joints, head, hands and feet, the whole body, and contacts.
+fn agent(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
+    let (links, dynamics) = (scene.links, scene.dynamics);
     let root = &links[0];
     let into_root = |v: Vector3<f32>| root.pose.rotation.inverse_transform_vector(&v);
     let center = root.pose.translation.vector;
@@ -69,7 +75,15 @@ pub(super) fn observe(model: &CharacterModel, scene: &ObservationInputs, w: &mut
     w.vector(into_root(dynamics.com - center));
     w.vector(into_root(dynamics.com_velocity));
     w.vector(into_root(dynamics.angular_momentum) / model.momentum_scale);
-    w.flags(contacts);
+    w.flags(scene.contacts);
+}
+
+/// Reference minus agent: what the action, which is added to the reference, has to make up for.
+fn errors(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
+    let (links, next) = (scene.links, scene.next);
+    let root = &links[0];
+    let into_root = |v: Vector3<f32>| root.pose.rotation.inverse_transform_vector(&v);
+    let center = root.pose.translation.vector;
     joints(model, w, |i, p| {
         (relative(model, links, i, p).inverse() * relative(model, &next.links, i, p)).scaled_axis()
     });
@@ -80,9 +94,13 @@ pub(super) fn observe(model: &CharacterModel, scene: &ObservationInputs, w: &mut
     w.vector(into_root(wanted.linear - root.linear));
     w.vector(into_root(wanted.angular - root.angular));
     w.flags(&next.contacts);
-    let turn = std::f32::consts::TAU * next.phase;
+}
+
+/// The phase, and sine and cosine of one and two turns of it: these don't jump where a cycle begins anew.
+fn phase(phase: f32, w: &mut Writer) {
+    let turn = std::f32::consts::TAU * phase;
     for value in [
-        next.phase,
+        phase,
         turn.sin(),
         turn.cos(),
         (2.0 * turn).sin(),
@@ -90,17 +108,27 @@ pub(super) fn observe(model: &CharacterModel, scene: &ObservationInputs, w: &mut
     ] {
         w.one(value);
     }
-    for sample in ahead {
-        let coming = &sample.links[0].pose;
-        w.vector(into_root(coming.translation.vector - center));
-        w.vector((root.pose.rotation.inverse() * coming.rotation).scaled_axis());
-        joints(model, w, |i, p| {
-            relative(model, &sample.links, i, p).scaled_axis()
-        });
-        w.flags(&sample.contacts);
-    }
 }
 
+/// A later moment of the reference: its root against the agent's, its joints and contacts.
+fn further_ahead(
+    model: &CharacterModel,
+    root: &LinkState,
+    sample: &ReferenceState,
+    w: &mut Writer,
+) {
+    let turn = root.pose.rotation.inverse();
+    let coming = &sample.links[0].pose;
+    let shift = coming.translation.vector - root.pose.translation.vector;
+    w.vector(root.pose.rotation.inverse_transform_vector(&shift));
+    w.vector((turn * coming.rotation).scaled_axis());
+    joints(model, w, |i, p| {
+        relative(model, &sample.links, i, p).scaled_axis()
+    });
+    w.flags(&sample.contacts);
+}
+
+/// Writes a vector of each joint along its axes; `value` takes the numbers of a link and its parent.
 fn joints(model: &CharacterModel, w: &mut Writer, value: impl Fn(usize, usize) -> Vector3<f32>) {
     for (i, link) in model.character.links.iter().enumerate() {
         if let Some(parent) = link.parent {
@@ -109,6 +137,7 @@ fn joints(model: &CharacterModel, w: &mut Writer, value: impl Fn(usize, usize) -
     }
 }
 
+/// Rotation of a link's joint.
 fn relative(
     model: &CharacterModel,
     links: &[LinkState],
@@ -120,7 +149,7 @@ fn relative(
         .joint_rotation(link, links[parent].pose.rotation, links[link].pose.rotation)
 }
 
-/// Angular velocity of a link against its parent, in the link's frame.
+/// Angular velocity of a link against its parent, rad/s, in the link's frame.
 fn rate(links: &[LinkState], link: usize, parent: usize) -> Vector3<f32> {
     links[link]
         .pose

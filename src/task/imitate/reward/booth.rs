@@ -1,12 +1,13 @@
 //! The reward of Booth & Ivanov 2020, "Realistic Physics Based Character Controller". The paper says what is compared,
 //! its published program (marathon-envs, StyleTransfer002) by which formula: Σ w·exp(−D/s).
 
-use super::{Terms, body_errors};
+use super::errors::body_errors;
+use super::term_values::Terms;
 use crate::sim::LinkState;
 use crate::task::dynamics::Dynamics;
 use crate::task::model::CharacterModel;
 
-/// Divisors s of the errors D, for a character of 17 bodies and 32.5 kg.
+/// Divisors s of the errors D, as in that program: for a character of 17 bodies and 32.5 kg.
 const ROTATION: f32 = 16.0;
 const ANGULAR_VELOCITY: f32 = 7000.0;
 const END_EFFECTOR: f32 = 1.0;

@@ -1,11 +1,11 @@
 //! The imitation reward of Peng et al. 2018, "DeepMimic: example-guided deep reinforcement learning of physics-based
 //! character skills", section 5.1.
 
-use super::{Terms, body_errors, joint_error};
+use super::errors::{body_errors, joint_error, joint_rate};
+use super::term_values::Terms;
 use crate::sim::LinkState;
 use crate::task::dynamics::Dynamics;
 use crate::task::model::CharacterModel;
-use nalgebra::Vector3;
 
 /// pose exp(−2 Σ‖q̂ ⊖ q‖²), velocity exp(−0.1 Σ‖ω̂ − ω‖²), end effectors exp(−40 Σ‖p̂ − p‖²) over hands and feet, centre
 /// of mass exp(−10 ‖ĉ − c‖²). Sums run over joints; the root's rotation against the world counts as one, as in the
@@ -32,13 +32,4 @@ pub(super) fn terms(
         com_position: (-10.0 * com).exp(),
         ..Terms::default()
     }
-}
-
-/// Angular velocity against the parent, in the link's own frame, rad/s; the root's is against the world.
-pub(super) fn joint_rate(model: &CharacterModel, links: &[LinkState], i: usize) -> Vector3<f32> {
-    let against = model.character.links[i]
-        .parent
-        .map_or_else(Vector3::zeros, |p| links[p].angular);
-    let turn = links[i].pose.rotation;
-    turn.inverse_transform_vector(&(links[i].angular - against))
 }

@@ -1,11 +1,11 @@
 //! The imitation reward of the program that Peng et al. published with "DeepMimic" (2018). It isn't that of their paper:
 //! joints are weighted to a sum of one, and the root has a term of its own.
 
-use super::deepmimic::joint_rate;
-use super::{Terms, body, joint_error};
+use super::errors::{body, joint_error, joint_rate};
+use super::term_values::Terms;
 use crate::sim::LinkState;
 use crate::task::dynamics::Dynamics;
-use crate::task::imitate::reference::heading;
+use crate::task::imitate::placement::heading;
 use crate::task::model::CharacterModel;
 use nalgebra::Vector3;
 
@@ -45,7 +45,7 @@ pub(super) fn terms(
     }
 }
 
-/// Where a body is from above the root, along the root's heading; its height is that above the ground.
+/// Position of a body, metres: along the ground from the root in axes along its heading, and its height above the ground.
 fn seen(model: &CharacterModel, links: &[LinkState], end: usize) -> Vector3<f32> {
     let root = &links[0].pose;
     let (at, _) = body(model, links, end);

@@ -1,11 +1,13 @@
 //! Our own kernels: errors are averaged over links, so that no scale depends on how many there are.
 
-use super::{Terms, joint_error};
+use super::errors::joint_error;
+use super::term_values::Terms;
 use crate::sim::LinkState;
 use crate::task::dynamics::Dynamics;
 use crate::task::model::CharacterModel;
 
-/// See the fields of [`Terms`].
+/// See the fields of [`Terms`] for errors and scales. The scales are chosen; `docs/notebook/training-choices.md` compares these
+/// kernels with those of DeepMimic's program.
 pub(super) fn terms(
     model: &CharacterModel,
     agent: (&[LinkState], &Dynamics),
@@ -13,6 +15,7 @@ pub(super) fn terms(
 ) -> Terms {
     let (links, dynamics) = agent;
     let (wanted, wanted_dynamics) = reference;
+    // Links against the root: these three don't see where the character is, which the terms of root and centre of mass do.
     let (mut pose, mut velocity, mut position) = (0.0, 0.0, 0.0);
     let root = links[0].pose.translation.vector;
     let wanted_root = wanted[0].pose.translation.vector;
@@ -25,10 +28,12 @@ pub(super) fn terms(
     }
     let n = (links.len().max(2) - 1) as f32;
     let (a, b) = (&links[0], &wanted[0]);
+    // The root against the world. Position and rotation share a term, for either alone is worth little.
     let root_error = 10.0 * (root - wanted_root).norm_squared()
         + 2.0 * a.pose.rotation.angle_to(&b.pose.rotation).powi(2);
     let root_rate =
         (a.linear - b.linear).norm_squared() + 0.1 * (a.angular - b.angular).norm_squared();
+    // In units of the character's own size and weight, so that a child and a giant have the same scale.
     let momentum =
         (dynamics.angular_momentum - wanted_dynamics.angular_momentum) / model.momentum_scale;
     Terms {

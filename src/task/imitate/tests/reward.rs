@@ -40,7 +40,7 @@ fn a_perfect_agent_earns_everything() {
     for (name, value) in TERM_NAMES.iter().zip(terms.values()).take(7) {
         close(value, 1.0, name);
     }
-    close(terms.total(&Rewards::default()), 1.0, "the reward");
+    close(terms.total(Rewards::default().weights()), 1.0, "the reward");
 }
 
 #[test]
