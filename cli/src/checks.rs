@@ -1,6 +1,8 @@
 //! The checks of a motion as lines of text.
 
+use crate::failure::flag;
 use mimic::clip::Severity;
+use mimic::explain::Parameter;
 use mimic::motion::Check;
 use std::fmt::Write;
 
@@ -27,16 +29,25 @@ pub fn advice(checks: &[Check]) -> String {
         let at = check
             .frame
             .map_or(String::new(), |f| format!(", frame {f}"));
-        writeln!(
-            text,
-            "{} ({}{at}): {}",
-            check.id,
-            amounts(check),
-            check.advice
-        )
-        .ok();
+        let (id, amounts, advice) = (check.id, amounts(check), check.advice);
+        let flags = flags(check);
+        writeln!(text, "{id} ({amounts}{at}): {advice}{flags}").ok();
     }
     text
+}
+
+/// The flags that the advice is about, in brackets: ` (`--trim`)`.
+fn flags(check: &Check) -> String {
+    let flag = |parameter: &Parameter| match parameter {
+        // The only one that isn't a flag of importing or retargeting.
+        Parameter::Speed => Some("`mimic edit --speed`".to_owned()),
+        other => flag(*other).map(|flag| format!("`{flag}`")),
+    };
+    let flags: Vec<String> = check.parameters.iter().filter_map(flag).collect();
+    match flags.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", flags.join(", ")),
+    }
 }
 
 fn amounts(check: &Check) -> String {

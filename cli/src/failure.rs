@@ -11,7 +11,7 @@ use std::io;
 use std::path::Path;
 
 /// The flag that sets a parameter of the library.
-fn flag(parameter: Parameter) -> Option<&'static str> {
+pub fn flag(parameter: Parameter) -> Option<&'static str> {
     Some(match parameter {
         Parameter::Take => "--take",
         Parameter::FrameRate => "--fps",

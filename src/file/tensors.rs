@@ -11,8 +11,8 @@ use std::path::Path;
 
 /// The key of the metadata under which our JSON object stands.
 const KEY: &str = "mimic";
-/// Most bytes that are read of a file. Chosen: the largest clip, 20 million transforms of seven `f32`, has an eighth of that,
-/// so no file of ours is refused, and a path that is a mistake doesn't fill the memory.
+/// Most bytes that are read of a file. Chosen: the largest clip, 20 million transforms of seven `f32`, has an eighth of
+/// that, so no file of ours is refused, and a path that is a mistake doesn't fill the memory.
 const MOST_BYTES: u64 = 4 << 30;
 /// Bytes at the beginning of a file that say how long its header is.
 const LENGTH_BYTES: usize = 8;
@@ -291,7 +291,8 @@ mod tests {
         }
     }
 
-    /// A newer version may hold types of numbers that this one has never heard of, and have lost its end in a way of its own.
+    /// A newer version may hold types of numbers that this one has never heard of, and have lost its end in a way of its
+    /// own.
     #[test]
     fn a_newer_file_is_refused_as_newer_whatever_else_it_holds() {
         let newer = file(Format {

@@ -7,23 +7,28 @@ use crate::clip::LoopMode;
 use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, Vector3};
 
-/// What a motion is made from.
+/// What a motion is made from: coordinates and what they don't say themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draft {
+    /// Name of the motion.
     pub name: String,
+    /// Frames per second.
     pub fps: f64,
+    /// Whether the motion repeats. If it does, its last frame has to be its first one moved by `cycle`.
     pub loop_mode: LoopMode,
+    /// Where the next cycle of a motion that repeats begins; [`Cycle::NONE`] for one that ends.
     pub cycle: Cycle,
-    /// `qpos[f]`: MuJoCo's coordinates at every frame.
+    /// `qpos[f]`: coordinates of every frame in MuJoCo's order, as long as the skeleton's `nq`.
     pub qpos: Vec<Vec<f64>>,
-    /// Bodies that may stand on the ground.
+    /// Indices of the bodies that may stand on the ground.
     pub contact_bodies: Vec<usize>,
-    /// `contact[f][c]` per contact body; found from the poses, with the ground at z = 0, if `None`.
+    /// `contact[f][c]`: whether each contact body stands. If it is `None`, that is found from the poses, with the ground at
+    /// z = 0.
     pub contact: Option<Vec<Vec<bool>>>,
 }
 
 impl Motion {
-    /// Velocities, body poses and all tracks of a draft.
+    /// The motion of a draft, with velocities, body poses and all tracks.
     ///
     /// # Panics
     /// If a frame of `qpos` is not of length [`Skeleton::nq`], `contact` has another shape than frames × contact
@@ -89,10 +94,10 @@ impl Motion {
         }
     }
 
-    /// That this motion was made for `skeleton`.
+    /// Checks that this motion was made for `skeleton`.
     ///
     /// # Errors
-    /// A skeleton of another file or with other bodies, or coordinates of other lengths than its own.
+    /// [`MotionError::OtherSkeleton`] if its skeleton has another file or other bodies, or its coordinates have other lengths.
     pub fn check_skeleton(&self, skeleton: &Skeleton) -> Result<(), MotionError> {
         let fits = |rows: &[Vec<f64>], n: usize| rows.iter().all(|r| r.len() == n);
         let same = self.skeleton_sha256 == skeleton.sha256
@@ -110,7 +115,7 @@ impl Motion {
     }
 }
 
-/// Contacts of every contact body with the ground at z = 0.
+/// `[f][c]`: whether each contact body stands on the ground at z = 0.
 fn contacts(skeleton: &Skeleton, bodies: &[Vec<Isometry3<f64>>], draft: &Draft) -> Vec<Vec<bool>> {
     let leg = skeleton.leg_length();
     let per_body: Vec<Vec<bool>> = draft

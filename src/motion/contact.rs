@@ -1,30 +1,35 @@
 //! When a foot stands on the ground, from the paths of its points.
 //!
-//! A point stands while it is slow and low. All lengths are in leg lengths and all times in seconds, so that a
+//! A point stands while it is slow and low. Lengths are measured in leg lengths and times in seconds, so that a
 //! child's walk at 30 Hz and a giant's at 120 Hz get the same labels. Velocities are averaged over 1/30 s before and
-//! after a frame, the slower of which counts: a foot stands from the frame in which it comes to rest. A stance has to
-//! be clearly slow and low somewhere, and extends as far as it stays fairly so (hysteresis, the same in both directions
-//! of time); short gaps are closed and short touches dropped.
+//! after a frame, and the slower of the two counts: a foot stands from the frame in which it comes to rest.
+//!
+//! Two levels of speed and height (hysteresis, alike in both directions of time) keep a stance whole: it has to be clearly
+//! slow and low somewhere, and extends as far as it stays fairly so. Short gaps are closed then, and short touches dropped.
 
 use crate::clip::LoopMode;
 use nalgebra::Vector3;
 
-/// Leg lengths per second below which a point is clearly, and at most fairly, at rest.
+/// Speeds below which a point is clearly and fairly at rest, leg lengths per second. Chosen: 0.2 and 0.3 m/s with legs of
+/// 0.8 m; the foot of a walk swings at several m/s.
 const SPEED: [f64; 2] = [0.25, 0.4];
-/// Leg lengths above the floor below which a point is clearly, and at most fairly, down.
+/// Heights above the floor below which a point is clearly and fairly down, leg lengths. Chosen: 3 and 5 cm with legs of 0.8
+/// m.
 const HEIGHT: [f64; 2] = [0.04, 0.06];
-/// Averaging window of velocity and height, s.
+/// Window in which velocity and height are averaged, s: a frame of the slowest usual rate, so that clips of higher rates
+/// are looked at no more closely.
 const WINDOW: f64 = 1.0 / 30.0;
-/// Shortest stance and shortest gap between stances, s.
+/// Shortest stance and shortest gap between stances, s. Chosen: the stances of a sprint, the shortest there are, take some
+/// 0.1 s.
 const SHORTEST: f64 = 0.08;
-/// Share of frames in which a point may be below its floor level.
+/// Share of frames in which a point may be below its floor level. Chosen: a few frames of noise don't lower the floor.
 const FLOOR_QUANTILE: f64 = 0.05;
 
-/// Whether a foot stands on the ground, per frame.
+/// Finds in which frames a foot stands, on a floor of unknown height.
 ///
-/// `points[f]` are positions of the foot's points (joints, corners, …) at frame `f`, world frame, metres, the same
-/// points in the same order in every frame. Every point's level of the floor is taken from the clip: where it is
-/// lowest. A foot that never comes down needs [`detect_above`].
+/// `points[f]` holds positions of the foot's points (joints, corners, …) at frame `f` in the world, metres: the same points
+/// in the same order in every frame. Each point has a floor of its own, at the height where it is lowest in the clip. For a
+/// foot that never comes down, use [`detect_above`].
 pub fn detect(
     points: &[Vec<Vector3<f64>>],
     fps: f64,
@@ -34,7 +39,7 @@ pub fn detect(
     detect_each(points, fps, leg_length, loop_mode, floor_level)
 }
 
-/// The same with the ground at height `floor`.
+/// Finds in which frames a foot stands, on a floor at height `floor`, metres. The rest is as in [`detect`].
 pub fn detect_above(
     points: &[Vec<Vector3<f64>>],
     floor: f64,
@@ -45,6 +50,7 @@ pub fn detect_above(
     detect_each(points, fps, leg_length, loop_mode, |_| floor)
 }
 
+/// Finds in which frames any of the points stands; `floor` gives a point's floor from its path.
 fn detect_each(
     points: &[Vec<Vector3<f64>>],
     fps: f64,
@@ -59,6 +65,7 @@ fn detect_each(
         let level = floor(&path);
         let states = states(&path, level, fps, leg_length, loop_mode);
         for run in runs(&states, loop_mode, |s| *s != State::Away) {
+            // A run that is nowhere clearly slow and low is a foot that passes the ground.
             if run.iter().any(|&f| states[f] == State::Clear) {
                 run.iter().for_each(|&f| stands[f] = true);
             }
@@ -68,7 +75,7 @@ fn detect_each(
     stands
 }
 
-/// Height that a path is below in only a few frames.
+/// The height below which a path is in only a few frames, metres.
 fn floor_level(path: &[Vector3<f64>]) -> f64 {
     let mut heights: Vec<f64> = path.iter().map(|p| p.z).collect();
     heights.sort_by(f64::total_cmp);
@@ -79,11 +86,15 @@ fn floor_level(path: &[Vector3<f64>]) -> f64 {
 /// How surely a point stands in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
+    /// Slow and low beyond doubt.
     Clear,
+    /// Slow and low enough to go on standing.
     Fair,
+    /// Fast or high.
     Away,
 }
 
+/// The state of a point in every frame.
 fn states(
     path: &[Vector3<f64>],
     floor: f64,
@@ -114,7 +125,8 @@ fn states(
         .collect()
 }
 
-/// Size of the mean of velocities `from..to`; infinite where there are none.
+/// Size of the mean of velocities `from..to`; infinite where there are none. The mean is of vectors, so that shaking about
+/// a place is slow.
 fn mean_speed(steps: &[Vector3<f64>], from: i64, to: i64, loop_mode: LoopMode) -> f64 {
     let around = window(steps, from, to, loop_mode);
     match around.len() {
@@ -158,6 +170,7 @@ fn runs<T>(items: &[T], loop_mode: LoopMode, is: impl Fn(&T) -> bool) -> Vec<Vec
         }
         open = now;
     }
+    // What runs into the end of a cycle goes on at its start.
     let seam = loop_mode == LoopMode::Wrap && runs.len() > 1;
     let starts = runs.first().is_some_and(|r| r[0] == 0);
     let ends = runs
@@ -175,6 +188,7 @@ fn runs<T>(items: &[T], loop_mode: LoopMode, is: impl Fn(&T) -> bool) -> Vec<Vec
 fn settle(stands: &mut [bool], fps: f64, loop_mode: LoopMode) {
     let shortest = (SHORTEST * fps).round() as usize;
     let last = stands.len().saturating_sub(1);
+    // Gaps first: two touches with a short gap between them may be long enough together.
     for state in [false, true] {
         for run in runs(stands, loop_mode, |s| *s == state) {
             // The first and last frame of a wrapping motion are one moment.

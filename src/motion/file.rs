@@ -1,13 +1,13 @@
-//! `NAME.motion`: a safetensors file with the coordinates, body poses and tracks of a [`Motion`], and its other fields as JSON
-//! metadata.
+//! `NAME.motion`: a safetensors file with the coordinates, body poses and tracks of a [`Motion`], and its other fields as
+//! JSON metadata.
 //!
 //! Tensors are f64, for F frames, B bodies and C contact bodies: `qpos` \[F, nq\] and `qvel` \[F, nv\] in MuJoCo's order,
 //! `body_position` \[F, B, 3\], `body_rotation` \[F, B, 4\] (w, x, y, z), `phase` \[F\], `com`, `com_velocity`,
 //! `linear_momentum` and `angular_momentum` \[F, 3\], `contact` u8 \[F, C\], `root_wrench_residual` \[F, 6\]. A file that
 //! another program wrote may have f32 in place of f64.
 //!
-//! A motion that was retargeted has its source too, of J joints, all f32 but the parents: the joint tree `source_parent` i32 \[J\],
-//! `source_rest_translation` \[J, 3\], `source_rest_rotation` \[J, 4\]; the transforms in the first frame
+//! A motion that was retargeted has its source too, of J joints, all f32 but the parents: the joint tree `source_parent`
+//! i32 \[J\], `source_rest_translation` \[J, 3\], `source_rest_rotation` \[J, 4\]; the transforms in the first frame
 //! `source_first_translation` and `source_first_rotation`; and tracks `source_rotation` \[F, R, 4\] and
 //! `source_translation` \[F, S, 3\] of joints that the metadata lists.
 //!

@@ -1,9 +1,9 @@
-//! Centre of mass and momenta along a motion.
+//! Centre of mass and momenta of the whole body along a motion.
 
 use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, Vector3};
 
-/// Whole-body tracks that follow from poses and velocities frame by frame.
+/// The tracks that follow from poses and velocities of one frame at a time; units as in [`Tracks`](super::Tracks).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct WholeBody {
     pub(crate) com: Vec<Vector3<f64>>,
@@ -12,7 +12,8 @@ pub(crate) struct WholeBody {
     pub(crate) angular_momentum: Vec<Vector3<f64>>,
 }
 
-/// See [`Skeleton::com`] and [`Skeleton::momentum`]; the centre of mass moves at linear momentum over mass.
+/// Computes the tracks by [`Skeleton::com`] and [`Skeleton::momentum`]. The centre of mass moves at linear momentum over
+/// mass, which is exact; a difference of positions would only approximate it.
 pub(crate) fn whole_body(
     skeleton: &Skeleton,
     qpos: &[Vec<f64>],

@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The x ≥ 0 that minimises ‖A x − b‖: the active-set method of Lawson and Hanson, Solving Least Squares Problems
+/// Finds the x ≥ 0 that minimises ‖A x − b‖, by the active-set method of Lawson and Hanson, Solving Least Squares Problems
 /// (1974), chapter 23.
 ///
-/// Columns enter one by one while the gradient says that they help; a column that would turn negative leaves.
+/// Columns enter the solution one by one while the gradient says that they help, and a column that would turn negative
+/// leaves.
 pub(crate) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     active_set(a, b, 0.0, |part| {
         let normal = part.transpose() * part;
@@ -13,7 +14,9 @@ pub(crate) fn solve(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     })
 }
 
-/// The same with ‖`even` x‖² added. (AᵀA + e²)⁻¹ Aᵀ = Aᵀ (A Aᵀ + e²)⁻¹ makes its systems as small as A has rows.
+/// Finds the x ≥ 0 that minimises ‖A x − b‖² + ‖`even` x‖², which spreads x over columns that do the same.
+///
+/// The systems have only as many unknowns as A has rows, by (AᵀA + e²)⁻¹ Aᵀ = Aᵀ (A Aᵀ + e²)⁻¹.
 pub(crate) fn solve_evenly(a: &DMatrix<f64>, b: &DVector<f64>, even: f64) -> DVector<f64> {
     active_set(a, b, even, |part| {
         let mut small = part * part.transpose();
@@ -22,7 +25,7 @@ pub(crate) fn solve_evenly(a: &DMatrix<f64>, b: &DVector<f64>, even: f64) -> DVe
     })
 }
 
-/// `optimum` gives the unconstrained optimum over some columns.
+/// The active-set method; `optimum` gives the unconstrained optimum over some columns.
 fn active_set(
     a: &DMatrix<f64>,
     b: &DVector<f64>,
@@ -32,6 +35,7 @@ fn active_set(
     let columns = a.ncols();
     let mut x = DVector::zeros(columns);
     let mut passive = vec![false; columns];
+    // A gradient this small, relative to the sizes of A and b, is rounding.
     let tolerance = 1e-10 * (1.0 + a.norm() * b.norm());
     // The method is finite; the bound only guards against cycling by rounding.
     for _ in 0..3 * columns {
@@ -62,6 +66,7 @@ fn descend(
     loop {
         let set: Vec<usize> = (0..passive.len()).filter(|&j| passive[j]).collect();
         let optimum = optimum(&a.select_columns(&set))?;
+        // The longest step towards the optimum that keeps all of x non-negative, and the column that stops it.
         let ratio = |j: usize, s: f64| if x[j] > 0.0 { x[j] / (x[j] - s) } else { 0.0 };
         let blocking = set
             .iter()

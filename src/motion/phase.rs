@@ -1,4 +1,4 @@
-//! The phase track.
+//! The phase track: how far a motion has come, as imitation learning uses it (Peng et al., DeepMimic, 2018).
 
 /// Phase of each of `frames` frames: 0 at the first, 1 at the last, linear in time; 0 for a single frame.
 pub(crate) fn phase(frames: usize) -> Vec<f64> {

@@ -6,26 +6,28 @@ use crate::clip::LoopMode;
 use crate::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-/// A body whose acceleration is as near to gravity as this falls freely, m/s².
-const FREELY: f64 = 1.0;
-/// Share of a frame by which times may differ and be the same.
+/// How near the acceleration of the centre of mass must be to gravity for the body to be in free fall, m/s². Chosen: a
+/// tenth of gravity.
+const FREE_FALL: f64 = 1.0;
+/// Share of a frame by which two times may differ and count as the same, for rounding.
 const SAME: f64 = 1e-6;
 
 /// Where a time falls: between two frames of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// Cycle number, 0 for the first; negative before it.
+    /// Cycle number: 0 for the first, negative before it.
     pub cycle: i64,
+    /// The frame at or before the time.
     pub frame: usize,
-    /// The frame after it, at most the last.
+    /// The frame after `frame`, at most the last.
     pub next: usize,
-    /// 0 at `frame`, 1 at `next`.
+    /// How far the time is from `frame` to `next`, from 0 to 1.
     pub blend: f64,
 }
 
 impl Motion {
-    /// Frames around `time` seconds. A wrapping motion goes on for ever in both directions; one that ends holds
-    /// its first and last frame.
+    /// The frames around `time`, seconds. A motion that repeats goes on for ever in both directions; one that ends holds
+    /// its first and its last frame. A time that isn't finite counts as 0.
     pub fn moment(&self, time: f64) -> Moment {
         let last = self.qpos.len().saturating_sub(1);
         let position = if time.is_finite() {
@@ -51,14 +53,14 @@ impl Motion {
         }
     }
 
-    /// Phase at `time`: 0 to 1 over the motion or its cycle.
+    /// Phase at `time`, seconds: 0 to 1 over the motion or its cycle.
     pub fn sample_phase(&self, time: f64) -> f64 {
         let m = self.moment(time);
         let at = |f: usize| self.tracks.phase.get(f).copied().unwrap_or(0.0);
         at(m.frame) + (at(m.next) - at(m.frame)) * m.blend
     }
 
-    /// `qpos` at `time`, in world coordinates of the first cycle's start.
+    /// `qpos` at `time`, seconds. Later cycles go on from where the ones before have travelled.
     ///
     /// # Panics
     /// If the motion has no frames or was made for another skeleton (see [`Motion::check_skeleton`]).
@@ -71,7 +73,7 @@ impl Motion {
         }
     }
 
-    /// `qvel` at `time`: linear between frames; zero where a motion that ends is held.
+    /// `qvel` at `time`, seconds: linear between frames, and zero where a motion that ends holds a frame.
     ///
     /// # Panics
     /// If the motion has no frames.
@@ -88,15 +90,19 @@ impl Motion {
         }
     }
 
-    /// Mean `qvel` of the frames' steps within `half` seconds on either side of `time`, and of fewer near a takeoff or a
-    /// landing, where the velocity changes at once; at least of one step on either side, which is [`Motion::sample_qvel`].
+    /// `qvel` at `time`, averaged over the steps from frame to frame within `half` seconds on either side, which takes
+    /// noise out of it.
+    ///
+    /// Near a takeoff or a landing fewer steps count, because the velocity changes there at once. At least one step on
+    /// either side does, and then this is [`Motion::sample_qvel`].
     ///
     /// # Panics
     /// If the motion has no frames.
     pub fn mean_qvel(&self, time: f64, half: f64) -> Vec<f64> {
         let most = (half * self.fps).round().max(1.0) as usize;
         let count = (2..=most).rev().find(|n| self.all_alike(time, *n));
-        // A frame's velocity is the mean of the steps to it and from it: every other frame has every step once.
+        // A frame's velocity is the mean of the steps to it and from it, so the velocities of every other frame hold every
+        // step once.
         let count = count.unwrap_or(1);
         let at = |i: usize| {
             let time = time + (2.0 * i as f64 + 1.0 - count as f64) / self.fps;
@@ -112,26 +118,26 @@ impl Motion {
         })
     }
 
-    /// Whether the motion falls freely in all of the `count` frames on either side of `time`, or in none.
+    /// Whether the body is in free fall in all of the `count` frames on either side of `time`, or in none of them.
     fn all_alike(&self, time: f64, count: usize) -> bool {
         let (at, count) = (time * self.fps, count as f64);
         let (first, last) = ((at - count + SAME).floor(), (at + count - SAME).ceil());
-        let mut frames = (first as i64..=last as i64).map(|frame| self.falls(frame));
+        let mut frames = (first as i64..=last as i64).map(|frame| self.is_free_fall(frame));
         let alike = frames.next();
         frames.all(|falls| Some(falls) == alike)
     }
 
-    /// Whether the centre of mass falls freely in a frame, from the one before to the one after.
-    fn falls(&self, frame: i64) -> bool {
+    /// Whether the centre of mass falls freely from the frame before `frame` to the one after, by its second difference.
+    fn is_free_fall(&self, frame: i64) -> bool {
         let com = [-1, 0, 1].map(|by| self.com(frame + by));
         let [Some(before), Some(now), Some(after)] = com else {
             return false;
         };
         let acceleration = (before - now * 2.0 + after) * self.fps.powi(2);
-        (acceleration + Vector3::z() * GRAVITY).norm() < FREELY
+        (acceleration + Vector3::z() * GRAVITY).norm() < FREE_FALL
     }
 
-    /// The centre of mass in a frame, of any cycle of a motion that repeats.
+    /// The centre of mass in a frame of any cycle, metres; `None` beyond the ends of a motion that ends.
     fn com(&self, frame: i64) -> Option<Vector3<f64>> {
         let period = self.tracks.com.len().checked_sub(1)? as i64;
         if self.loop_mode == LoopMode::Clamp || period == 0 {
@@ -141,7 +147,9 @@ impl Motion {
         Some((self.cycle_offset(frame.div_euclid(period)) * Point3::from(com)).coords)
     }
 
-    /// World poses of all bodies at `time`, each interpolated on its own.
+    /// World poses of all bodies at `time`, seconds, in the skeleton's order.
+    ///
+    /// Each body is interpolated on its own, which costs less than kinematics; between frames, joints come apart a little.
     ///
     /// # Panics
     /// If the motion has no frames.
@@ -158,7 +166,7 @@ impl Motion {
             .collect()
     }
 
-    /// Whether contact body `c` stands at `time`: as in the nearer frame.
+    /// Whether contact body number `c` stands at `time`, seconds: as in the nearer frame.
     pub fn sample_contact(&self, c: usize, time: f64) -> bool {
         let m = self.moment(time);
         let frame = if m.blend < 0.5 { m.frame } else { m.next };

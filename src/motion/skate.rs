@@ -1,13 +1,16 @@
-//! How fast a standing body slides.
+//! How fast a standing body slides over the ground.
 
 use crate::skeleton::{Shape, Twist};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// Points this little above the lowest one touch the ground with it, metres.
+/// Points at most this far above the lowest one touch the ground with it, metres. Chosen: half of what standing feet may
+/// float.
 const TOUCHING: f64 = 0.005;
 
-/// Horizontal speed of a body's lowest point, m/s: of several that touch the ground together, the one that moves
-/// least, so that a foot that pivots doesn't skate. The origin's for a body without shapes.
+/// Horizontal speed at which a body slides over the ground, m/s, given its world pose and velocity.
+///
+/// It is the speed of the body's lowest point. If several points touch the ground together, the slowest of them counts, so
+/// that a foot that pivots doesn't skate. A body without shapes slides with its origin.
 pub fn sole_speed(shapes: &[Shape], pose: &Isometry3<f64>, twist: &Twist) -> f64 {
     let speed = |p: &Vector3<f64>| twist.at(pose, p).linear.xy().norm();
     let points: Vec<Vector3<f64>> = shapes.iter().flat_map(|s| ground_points(s, pose)).collect();
@@ -17,7 +20,7 @@ pub fn sole_speed(shapes: &[Shape], pose: &Isometry3<f64>, twist: &Twist) -> f64
     slowest.unwrap_or_else(|| speed(&pose.translation.vector))
 }
 
-/// Points of a shape that can be lowest.
+/// The points of a shape that can be its lowest, world, metres.
 fn ground_points(shape: &Shape, pose: &Isometry3<f64>) -> Vec<Vector3<f64>> {
     let pole =
         |p: &Vector3<f64>, radius: f64| (pose * Point3::from(*p)).coords - Vector3::z() * radius;

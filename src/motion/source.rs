@@ -9,17 +9,17 @@ use std::collections::BTreeMap;
 
 /// What carrying a motion back onto the rig that it comes from needs beside the motion itself.
 ///
-/// Joints that a body of the skeleton follows have no tracks, since the motion says where they are. The others (fingers, the face,
-/// twist bones, a root above the hips) have tracks where they move in the clip. All numbers are exact in `f32`, as clips' files
-/// hold them.
+/// Joints that a body of the skeleton follows have no tracks, since the motion says where they are. The others (fingers,
+/// the face, twist bones, a root above the hips) have tracks where they move in the clip. All numbers are exact in `f32`,
+/// as clips' files hold them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SourceRig {
     /// The source's joint tree: names, parents and rest transforms. Parents stand before their children.
     pub joints: Vec<Joint>,
     /// Index of the joint used for each slot.
     pub map: BTreeMap<Slot, usize>,
-    /// Transform of every joint in its parent in the motion's first frame, metres. Joints without tracks that no body follows
-    /// keep it.
+    /// Transform of every joint in its parent in the motion's first frame, metres. Joints without tracks that no body
+    /// follows keep it.
     pub first: Vec<Isometry3<f64>>,
     /// Rotation in its parent by frame of the motion, of joints that turn and that no body follows.
     pub rotations: BTreeMap<usize, Vec<UnitQuaternion<f64>>>,
@@ -49,8 +49,8 @@ const TRANSLATION: &str = "source_translation";
 const ROTATION: &str = "source_rotation";
 
 impl SourceRig {
-    /// Transform of `joint` in its parent in frame `frame` of the clip, metres; of a joint that a body follows, that of the first
-    /// frame.
+    /// Transform of `joint` in its parent in frame `frame` of the clip, metres; of a joint that a body follows, that of the
+    /// first frame.
     ///
     /// # Panics
     /// If there is no such joint, or it has a track without such a frame.

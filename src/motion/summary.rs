@@ -1,45 +1,49 @@
-//! What a motion's tracks come to, in a few numbers.
+//! The tracks of a motion in a few numbers.
 
 use super::{Motion, Tracks};
 use serde::Serialize;
 
-/// Least, mean and greatest value over the frames; zeros where there are none.
+/// Least, mean and greatest value over the frames; zeros for a motion without frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Extent {
+    /// The least value.
     pub min: f64,
+    /// The mean over all frames.
     pub mean: f64,
+    /// The greatest value.
     pub max: f64,
 }
 
-/// How much a body stands on the ground.
+/// How long a body stands on the ground.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ContactShare {
+    /// Name of the body.
     pub body: String,
-    /// Part of the frames in which it stands there, from 0 to 1.
+    /// Share of the frames in which the body stands, from 0 to 1.
     pub share: f64,
 }
 
-/// The tracks of a motion over all its frames. Of vectors, their lengths.
+/// The tracks of a motion over all its frames. Vectors are summed up by their lengths.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Height of the centre of mass above the ground, metres.
     pub com_height_m: Extent,
     /// Speed of the centre of mass, m/s.
     pub com_speed_m_s: Extent,
-    /// kg·m/s.
+    /// Linear momentum of the whole body, kg·m/s.
     pub linear_momentum: Extent,
-    /// About the centre of mass, kg·m²/s.
+    /// Angular momentum about the centre of mass, kg·m²/s.
     pub angular_momentum: Extent,
     /// Force that no ground contact can supply, N.
     pub unsupported_force_n: Extent,
     /// Moment about the root that no ground contact can supply, N·m.
     pub unsupported_moment_n_m: Extent,
-    /// In the order of [`Motion::contact_bodies`].
+    /// How long each contact body stands, in the order of [`Motion::contact_bodies`].
     pub contacts: Vec<ContactShare>,
 }
 
 impl Motion {
-    /// The tracks in a few numbers.
+    /// Sums up the tracks in a few numbers.
     pub fn summary(&self) -> Summary {
         let tracks = &self.tracks;
         Summary {
@@ -53,7 +57,7 @@ impl Motion {
         }
     }
 
-    /// Names of the bodies that may stand on the ground.
+    /// Names of the bodies that may stand on the ground, in the order of [`Motion::contact_bodies`].
     pub fn contact_names(&self) -> Vec<String> {
         let name = |body: &usize| {
             let name = self.body_names.get(*body).cloned();

@@ -124,7 +124,8 @@ fn a_mean_velocity_is_the_way_over_its_time() {
     assert!((ends[0] - near(0, 1)).abs() < 1e-9 && (ends[1] - near(29, 30)).abs() < 1e-9);
 }
 
-/// It stands, jumps and stands again: means are of the flight or of the ground, and where the two meet of the steps next to it.
+/// It stands, jumps and stands again: means are of the flight or of the ground, and where the two meet of the steps next to
+/// it.
 #[test]
 fn mean_velocities_know_takeoff_and_landing() {
     let s = humanoid();

@@ -1,4 +1,4 @@
-//! Frames before the first and after the last.
+//! Frames before the first and after the last: derivatives and windows of a motion that repeats go on over its seam.
 
 use super::Cycle;
 use crate::clip::LoopMode;
@@ -14,7 +14,8 @@ pub(crate) struct Timeline {
 
 impl Timeline {
     /// Cycle number and frame of frame `index`, which may be negative or beyond the end; `None` where a motion
-    /// that ends has no such frame. The last frame is frame 0 of the next cycle, so frame 1 follows it.
+    /// that ends has no such frame. In a motion that repeats, the last frame is frame 0 of the next cycle, so that frame 1
+    /// follows it.
     pub(crate) fn locate(&self, index: i64) -> Option<(i64, usize)> {
         let frames = i64::try_from(self.frames).ok()?;
         if (0..frames).contains(&index) {
@@ -30,7 +31,8 @@ impl Timeline {
         }
     }
 
-    /// Indices of up to `2 * reach + 1` frames around `frame`, moved inwards at the ends of a motion that ends.
+    /// Indices of up to `2 * reach + 1` frames around `frame`. At the ends of a motion that ends the window is moved
+    /// inwards rather than cut, so that a polynomial fitted to it has as many points everywhere.
     pub(crate) fn window(&self, frame: usize, reach: usize) -> std::ops::RangeInclusive<i64> {
         let (frame, reach) = (frame as i64, reach as i64);
         let last = self.frames as i64 - 1;
@@ -53,6 +55,7 @@ impl Cycle {
         let n = n as f64;
         let turn = |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
         let half = self.heading / 2.0;
+        // The quotient is 0 / 0 where cycles don't turn, and there its limit is n.
         let shift = if half.sin().abs() < 1e-9 {
             self.translation * n
         } else {

@@ -1,8 +1,9 @@
-//! The torques that a motion asks of the joints.
+//! The torques that a motion asks of the joints: inverse dynamics by the recursive Newton-Euler algorithm (Featherstone,
+//! Rigid Body Dynamics Algorithms, 2008, chapter 5).
 //!
-//! Newton and Euler body by body, summed from the leaves to the root (inverse dynamics; Featherstone, Rigid Body
-//! Dynamics Algorithms, 2008, chapter 5), with the loads that the ground supplies. What no load explains is left to the
-//! root.
+//! Every body needs a force and a moment, which follow from its acceleration. The ground supplies some of them, and the
+//! joint above the body the others; these are summed from the leaves to the root. What neither joints nor ground supply is
+//! left to the root.
 
 use super::Motion;
 use super::timeline::Timeline;
@@ -11,8 +12,8 @@ use crate::skeleton::{GRAVITY, Joint, JointKind, Skeleton};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 impl Motion {
-    /// Generalised forces of every joint but the root's, `[frames, nv]` in the order of MuJoCo's `qfrc`: N·m along the
-    /// axes of hinges (N of slides), and along the child's axes of balls. Zero for the root.
+    /// Torques of all joints, `[frames][nv]`, in the order of MuJoCo's `qfrc`: N·m about the axis of a hinge, N along that
+    /// of a slide, N·m about the child's axes of a ball. They are zero for the root, which has no drive.
     ///
     /// # Panics
     /// If the motion is not one of `skeleton`'s (see [`Motion::check_skeleton`]).
@@ -32,6 +33,7 @@ impl Motion {
             .collect()
     }
 
+    /// Which frame follows which.
     pub(super) fn timeline(&self) -> Timeline {
         Timeline {
             frames: self.qpos.len(),
@@ -40,6 +42,7 @@ impl Motion {
         }
     }
 
+    /// `[f]`: what the ground gives to which body.
     fn loads(&self, skeleton: &Skeleton, timeline: &Timeline) -> Vec<Vec<Load>> {
         let tracks = &self.tracks;
         let (com, spin, mass) = (&tracks.com, &tracks.angular_momentum, skeleton.total_mass());
@@ -61,7 +64,8 @@ impl Motion {
     }
 }
 
-/// `[f][b]`: force and moment about its centre of mass that body `b` needs beside gravity.
+/// `[f][b]`: force and moment about its centre of mass that body `b` needs besides gravity: m (c̈ − g) and the derivative
+/// of its own angular momentum.
 fn needs(motion: &Motion, skeleton: &Skeleton, timeline: &Timeline) -> Vec<Vec<Wrench>> {
     let twists: Vec<_> = motion
         .qpos
@@ -90,7 +94,7 @@ fn needs(motion: &Motion, skeleton: &Skeleton, timeline: &Timeline) -> Vec<Vec<W
     (0..motion.qpos.len()).map(frame).collect()
 }
 
-/// Forces of the joints in one frame.
+/// Torques of the joints in one frame.
 fn torques(
     skeleton: &Skeleton,
     (qpos, poses): (&[f64], &[Isometry3<f64>]),
@@ -108,6 +112,8 @@ fn torques(
         }
         carried.push((force, moment));
     }
+    // From the leaves to the root, for bodies stand behind their parents: a body's joint carries what the body itself needs
+    // and what the joints below it carry.
     let mut torques = vec![0.0; skeleton.nv];
     for (b, body) in skeleton.bodies.iter().enumerate().rev() {
         let (force, moment) = carried[b];
@@ -115,6 +121,7 @@ fn torques(
             carried[parent].0 += force;
             carried[parent].1 += moment;
         }
+        // The body's joints from the last to the first, each undone to find the axes of the one before.
         let mut after = poses[b];
         for joint in body.joints.iter().rev() {
             let anchor = (after * Point3::from(joint.anchor)).coords;

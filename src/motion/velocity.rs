@@ -4,11 +4,12 @@ use super::timeline::Timeline;
 use crate::skeleton::Skeleton;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// MuJoCo velocities of every frame.
+/// Velocities of every frame in MuJoCo's order, `[f][nv]`.
 ///
-/// Central differences, as the mean of the velocity from the frame before and to the frame after; both are in the
-/// frame's own axes, which a rotation and its rotation vector share. A wrapping motion continues over its
-/// seam; at the ends of one that ends the difference is one-sided of second order.
+/// These are central differences: the mean of the velocity from the frame before and of that to the frame after. Both can
+/// be averaged, because each is in the frame's own axes: turning by a rotation vector leaves that vector as it is. A motion
+/// that repeats goes on over its seam. At the ends of one that ends, the difference is one-sided of second order: 3/2 of
+/// the nearest step minus 1/2 of the next.
 pub(crate) fn qvel(
     skeleton: &Skeleton,
     qpos: &[Vec<f64>],
@@ -39,7 +40,7 @@ pub(crate) fn qvel(
         .collect()
 }
 
-/// `qpos` with its root moved by a world transform.
+/// `qpos` with its root, a free joint at its start, moved by a world transform.
 pub(crate) fn moved(qpos: &[f64], by: &Isometry3<f64>) -> Vec<f64> {
     let mut moved = qpos.to_vec();
     let &[x, y, z, w, i, j, k, ..] = qpos else {
@@ -52,7 +53,8 @@ pub(crate) fn moved(qpos: &[f64], by: &Isometry3<f64>) -> Vec<f64> {
     moved
 }
 
-/// `qvel` seen after a world turn: only the root's linear velocity is in world axes.
+/// `qvel` after a turn of the world. Only the root's linear velocity is in world axes; MuJoCo has its angular velocity in
+/// the body's own.
 pub(crate) fn turned(qvel: &[f64], by: &UnitQuaternion<f64>) -> Vec<f64> {
     let mut turned = qvel.to_vec();
     if let &[x, y, z, ..] = qvel {

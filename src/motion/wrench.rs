@@ -1,8 +1,9 @@
-//! The part of a motion that its contacts can't explain.
+//! The root wrench residual: the part of a motion that its contacts can't explain.
 //!
-//! Newton and Euler about the centre of mass: the ground has to supply F = m (c̈ − g) and τ = dL/dt. Contacts supply
-//! forces inside friction cones at the points on which bodies stand. What is left would need a hand from nowhere:
-//! the root wrench residual (residual forces of Yuan and Kitani, NeurIPS 2020; root residuals of OpenSim's RRA).
+//! By Newton's and Euler's laws about the centre of mass, the ground has to supply the force F = m (c̈ − g) and the moment
+//! τ = dL/dt. Contacts supply forces inside friction cones, at the points on which bodies stand. What is left is a force
+//! and a moment that no contact can supply (residual forces of Yuan and Kitani, NeurIPS 2020; root residuals of OpenSim's
+//! RRA).
 
 use super::nnls;
 use super::timeline::Timeline;
@@ -10,43 +11,49 @@ use crate::skeleton::{GRAVITY, Skeleton};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3, Vector6};
 use std::f64::consts::TAU;
 
-/// Half width of the window in which accelerations are fitted, s.
+/// Half width of the window in which accelerations are fitted, s. Chosen: seven frames at 60 Hz. Second differences of
+/// single frames are mostly noise, and a longer window would smooth landings away.
 const SMOOTHING: f64 = 0.05;
-/// Points of a body this close to its lowest one can carry load, in leg lengths.
+/// Height above a body's lowest point up to which its points can carry load, leg lengths. Chosen: 2.4 cm with legs of 0.8
+/// m.
 const SOLE: f64 = 0.03;
-/// Edges of the pyramid that stands for a friction cone: between them 8 % of its friction is missing, with four 29 %.
+/// Edges of the pyramid that stands for a friction cone. Between two edges it has 1 − cos(π/8) = 8 % less friction than the
+/// cone; a pyramid of four edges would have 29 % less.
 const EDGES: usize = 8;
-/// What a load costs beside what it explains: little enough to change no load by more than a ten-thousandth.
+/// How much the size of loads counts beside what they explain. Its square is a ten-thousandth, and so is its effect on
+/// their sum.
 const EVENNESS: f64 = 0.01;
 
-/// Force (N) and moment about the centre of mass (N·m), world axes.
+/// A force (N) and a moment about the centre of mass (N·m), world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wrench {
     pub(crate) force: Vector3<f64>,
     pub(crate) moment: Vector3<f64>,
 }
 
-/// What the ground gives a body.
+/// A force with which the ground carries a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Load {
+    /// Index of the body.
     pub(crate) body: usize,
-    /// World, metres.
+    /// Where the force acts, world, metres.
     pub(crate) point: Vector3<f64>,
-    /// N.
+    /// The force, world axes, N.
     pub(crate) force: Vector3<f64>,
 }
 
 /// Which bodies stand on the ground.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Standing<'a> {
+    /// The contact bodies.
     pub(crate) bodies: &'a [usize],
     /// `contact[f][c]`: whether `bodies[c]` stands at frame `f`.
     pub(crate) contact: &'a [Vec<bool>],
 }
 
-/// What the world besides gravity has to supply in every frame.
+/// The force and the moment that the world has to supply besides gravity, in every frame.
 ///
-/// Derivatives are those of a quadratic fitted by least squares to the frames within 0.05 s (Savitzky and
+/// Derivatives are those of a quadratic fitted by least squares to the frames within [`SMOOTHING`] (Savitzky and
 /// Golay, Analytical Chemistry 36, 1964).
 pub(crate) fn required(
     com: &[Vector3<f64>],
@@ -70,18 +77,20 @@ pub(crate) fn required(
         .collect()
 }
 
-/// Frames on each side of the fitting window.
+/// Frames on each side of a frame in the window in which its accelerations are fitted.
 pub(crate) fn reach(fps: f64) -> usize {
     (SMOOTHING * fps).round().max(1.0) as usize
 }
 
-/// First and second time derivative at `frame` of the quadratic through its window.
+/// First and second time derivative of `value` at `frame`, by the quadratic fitted to its window; zeros where the window
+/// has too few frames for one. `value` takes the number of the cycle and the frame.
 pub(crate) fn derivatives(
     frame: usize,
     fps: f64,
     timeline: &Timeline,
     value: impl Fn(i64, usize) -> Vector3<f64>,
 ) -> (Vector3<f64>, Vector3<f64>) {
+    // The normal equations of the fit, with time in frames: well scaled at any rate.
     let mut normal = Matrix3::zeros();
     let mut moments = Matrix3::zeros();
     for index in timeline.window(frame, reach(fps)) {
@@ -105,14 +114,21 @@ pub(crate) fn derivatives(
 
 /// A motion over the ground that has to carry it.
 pub(crate) struct Support<'a> {
+    /// The skeleton that moves.
     pub(crate) skeleton: &'a Skeleton,
-    /// [`Skeleton::leg_length`].
+    /// Its [`Skeleton::leg_length`], metres.
     pub(crate) leg: f64,
+    /// `bodies[f][b]`: world pose of each body.
     pub(crate) bodies: &'a [Vec<Isometry3<f64>>],
+    /// `com[f]`: centre of mass, world, metres.
     pub(crate) com: &'a [Vector3<f64>],
+    /// `required[f]`: what [`required`] gives.
     pub(crate) required: &'a [Wrench],
+    /// Which bodies stand in which frames.
     pub(crate) standing: Standing<'a>,
+    /// Frames per second.
     pub(crate) fps: f64,
+    /// Which frame follows which.
     pub(crate) timeline: &'a Timeline,
 }
 
@@ -122,6 +138,7 @@ impl Support<'_> {
         let rays = self.rays(f);
         let (a, b) = self.equations(f, &rays);
         let left = &b - &a * nnls::solve(&a, &b);
+        // A wrench at the centre of mass, moved to the root: the same force, and its arm's moment added.
         let force = Vector3::new(left[0], left[1], left[2]);
         let moment = Vector3::new(left[3], left[4], left[5]) * self.length();
         let arm = self.com[f] - self.bodies[f][0].translation.vector;
@@ -129,8 +146,8 @@ impl Support<'_> {
         Vector6::from_iterator(force.iter().chain(moment.iter()).copied())
     }
 
-    /// What the ground supplies in frame `f`: of all ways the one that is spread most evenly, so that feet don't push
-    /// against each other.
+    /// What the ground supplies in frame `f`. Many loads explain a motion equally well; these are spread most evenly, so
+    /// that feet don't push against each other.
     pub(crate) fn loads(&self, f: usize) -> Vec<Load> {
         let rays = self.rays(f);
         let (a, b) = self.equations(f, &rays);
@@ -143,10 +160,11 @@ impl Support<'_> {
         bearing.map(load).collect()
     }
 
-    /// Forces of 1 N upwards along the edges of all friction pyramids.
+    /// The forces along the edges of all friction pyramids, each with 1 N upwards. Contacts supply sums of them with
+    /// factors that aren't negative.
     ///
-    /// Bodies count as standing if they do so within the window in which `required` was fitted, because its
-    /// loads are those of the whole window.
+    /// A body counts as standing if it stands anywhere in the window in which `required` was fitted, because the
+    /// fitted acceleration is that of the whole window.
     fn rays(&self, f: usize) -> Vec<Load> {
         let leg = self.leg;
         let near = |c: usize| {
@@ -163,7 +181,8 @@ impl Support<'_> {
             .collect()
     }
 
-    /// Rays as columns and the required wrench; moments about the centre of mass count in newtons at a leg's length.
+    /// The rays' wrenches about the centre of mass as columns, and the required wrench. Moments are divided by a leg's
+    /// length, so that forces and moments are in newtons both and errors in them are comparable.
     fn equations(&self, f: usize, rays: &[Load]) -> (DMatrix<f64>, DVector<f64>) {
         let column = |force: &Vector3<f64>, moment: Vector3<f64>| {
             let moment = moment / self.length();
@@ -179,12 +198,13 @@ impl Support<'_> {
         (a, DVector::from_column_slice(target.as_slice()))
     }
 
+    /// What moments are divided by, metres; a skeleton without legs mustn't make it zero.
     fn length(&self) -> f64 {
         self.leg.max(1e-3)
     }
 }
 
-/// Bodies that touch the ground though they have no contact track: whoever sits, kneels or lies is carried by them.
+/// Bodies that touch the ground but have no contact track: they carry a character that sits, kneels or lies.
 /// A motion without any contact bodies is one without a ground.
 fn lying<'a>(
     skeleton: &'a Skeleton,
@@ -199,7 +219,7 @@ fn lying<'a>(
         .filter(move |body| skeleton.lowest_point_of(poses, &[*body]) <= SOLE * leg_length)
 }
 
-/// Edge forces of the friction pyramids under one body, of 1 N upwards each.
+/// The edge forces of the friction pyramids under one body, each with 1 N upwards.
 fn friction_rays(
     skeleton: &Skeleton,
     poses: &[Isometry3<f64>],

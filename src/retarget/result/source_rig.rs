@@ -7,8 +7,9 @@ use crate::skeleton::Skeleton;
 use nalgebra::Isometry3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Turn (radians) and shift (metres) from the first frame below which a joint stands still. Chosen: files hold single precision, and
-/// importers' arithmetic leaves some 1e-7; an error of 1e-5 moves nothing visibly, at a metre from the joint by 0.01 mm.
+/// Turn (radians) and shift (metres) from the first frame below which a joint stands still. Chosen: files hold single
+/// precision, and importers' arithmetic leaves some 1e-7; an error of 1e-5 moves nothing visibly, at a metre from the joint
+/// by 0.01 mm.
 const STILL: f64 = 1e-5;
 
 /// The rig of the clip, and the tracks of its joints over the motion's frames.
