@@ -10,7 +10,7 @@ mod tensors;
 
 pub use error::{FileError, Flaw};
 pub use format::Format;
-pub(crate) use tensors::{Reader, Writer, load};
+pub(crate) use tensors::{Reader, Writer, format_of, load};
 
 use std::fs::File;
 use std::io::{self, Write};

@@ -5,6 +5,7 @@ use super::{FileError, Flaw, Format};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
@@ -231,6 +232,12 @@ fn header(bytes: &[u8]) -> Result<String, Flaw> {
     ours.ok_or(Flaw::Foreign)
 }
 
+/// The format that a file of ours says it has, by name; `None` for bytes that aren't such a file.
+pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
+    let stamped: Value = serde_json::from_str(&header(bytes).ok()?).ok()?;
+    Some(stamped["format"].as_str()?.to_owned())
+}
+
 fn container(error: SafeTensorError) -> Flaw {
     Flaw::Container {
         reason: error.to_string(),
@@ -278,7 +285,7 @@ mod tests {
             let reader = Reader::open(&bytes, FORMAT).expect("it is readable");
             let numbers: Vec<f32> = reader.tensor("numbers", &[None, Some(3)]).expect("there");
             assert_eq!(numbers, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-            let fields: serde_json::Value = reader.fields().expect("there");
+            let fields: Value = reader.fields().expect("there");
             let expected =
                 json!({ "format": "clip", "version": version, "name": "walk", "fps": 30.0 });
             assert_eq!(fields, expected);

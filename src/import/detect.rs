@@ -2,7 +2,7 @@
 
 use super::fbx::is_ascii as is_ascii_fbx;
 use crate::explain::Explanation;
-use safetensors::SafeTensors;
+use crate::file;
 
 /// A format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ const HEAD: usize = 4096;
 
 /// The format of `bytes`, or what they seem to be instead and what to do about it.
 pub(crate) fn detect(bytes: &[u8]) -> Result<Format, Explanation> {
-    if let Some(format) = own_format(bytes) {
+    if let Some(format) = file::format_of(bytes) {
         return Err(own_refusal(&format));
     }
     if bytes.starts_with(b"Kaydara FBX Binary") || is_ascii_fbx(bytes) {
@@ -61,21 +61,6 @@ fn acclaim(text: &[u8]) -> Option<Format> {
     } else {
         None
     }
-}
-
-/// The kind of one of our own files, as its metadata states it.
-fn own_format(bytes: &[u8]) -> Option<String> {
-    #[derive(serde::Deserialize)]
-    struct Stamp {
-        format: String,
-    }
-    // A safetensors file begins with eight bytes of length and a JSON object. Nothing is parsed unless that brace is there.
-    if bytes.get(8) != Some(&b'{') {
-        return None;
-    }
-    let (_, metadata) = SafeTensors::read_metadata(bytes).ok()?;
-    let text = metadata.metadata().as_ref()?.get("mimic")?;
-    Some(serde_json::from_str::<Stamp>(text).ok()?.format)
 }
 
 fn own_refusal(format: &str) -> Explanation {
