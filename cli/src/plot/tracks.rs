@@ -116,21 +116,26 @@ impl Sheet {
     /// Draws a panel with its curves, axis and legend.
     fn panel(&mut self, heading: &str, lines: &[Line]) {
         self.heading(heading);
-        let all = || {
-            lines
-                .iter()
-                .flat_map(|line| &line.values)
-                .copied()
-                .filter(|v| v.is_finite())
-        };
-        let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
-        let (low, high) = if high - low < 1e-9 {
-            (low, low + 1.0)
-        } else {
-            (low, high)
-        };
+        let values = lines.iter().flat_map(|line| &line.values).copied();
+        let (low, high) = values
+            .filter(|v| v.is_finite())
+            .fold((0.0_f64, 0.0_f64), |(low, high), v| {
+                (low.min(v), high.max(v))
+            });
+        // Curves that stay at zero get a range, too.
+        let high = if high - low < 1e-9 { low + 1.0 } else { high };
         let top = self.y;
         let height = |value: f64| top + PANEL * (high - value) / (high - low);
+        self.ticks(low, high, height);
+        for (row, line) in lines.iter().enumerate() {
+            self.curve(line, top + 14.0 + 18.0 * row as f64, height);
+        }
+        self.frame(PANEL);
+        self.y = top + PANEL + GAP;
+    }
+
+    /// Draws the grid lines from `low` to `high` at their `height`, with their values on the left.
+    fn ticks(&mut self, low: f64, high: f64, height: impl Fn(f64) -> f64) {
         let step = tick_step(high - low, PANEL);
         let mut tick = (low / step).ceil();
         while tick * step <= high + 1e-9 * step {
@@ -142,31 +147,26 @@ impl Sheet {
             self.text(LEFT - 8.0, y + 4.0, "tick", &short(value));
             tick += 1.0;
         }
-        for (row, line) in lines.iter().enumerate() {
-            let mut path = String::new();
-            for (frame, value) in line
-                .values
-                .iter()
-                .enumerate()
-                .filter(|(_, v)| v.is_finite())
-            {
-                let command = if path.is_empty() { 'M' } else { 'L' };
-                write!(path, "{command}{:.1} {:.1}", self.x(frame), height(*value)).ok();
-            }
-            let color = line.color;
-            self.draw(format!(
-                r#"<path class="line" stroke="{color}" d="{path}"/>"#
-            ));
-            let y = top + 14.0 + 18.0 * row as f64;
-            let x = WIDTH - RIGHT + 8.0;
-            self.draw(format!(
-                r#"<path class="line" stroke="{color}" d="M{x} {:.1}h16"/>"#,
-                y - 4.0
-            ));
-            self.text(x + 22.0, y, "legend", line.name);
+    }
+
+    /// Draws a curve, and its name in the legend at `y`.
+    fn curve(&mut self, line: &Line, y: f64, height: impl Fn(f64) -> f64) {
+        let mut path = String::new();
+        let values = line.values.iter().enumerate();
+        for (frame, value) in values.filter(|(_, v)| v.is_finite()) {
+            let command = if path.is_empty() { 'M' } else { 'L' };
+            write!(path, "{command}{:.1} {:.1}", self.x(frame), height(*value)).ok();
         }
-        self.frame(PANEL);
-        self.y = top + PANEL + GAP;
+        let color = line.color;
+        self.draw(format!(
+            r#"<path class="line" stroke="{color}" d="{path}"/>"#
+        ));
+        let x = WIDTH - RIGHT + 8.0;
+        self.draw(format!(
+            r#"<path class="line" stroke="{color}" d="M{x} {:.1}h16"/>"#,
+            y - 4.0
+        ));
+        self.text(x + 22.0, y, "legend", line.name);
     }
 
     fn heading(&mut self, text: &str) {

@@ -179,45 +179,48 @@ fn text(report: &Report) -> String {
     );
     section(&mut text, "takes");
     for (index, take) in report.takes.iter().enumerate() {
-        let TakeInfo {
-            name,
-            fps,
-            frames,
-            duration_s,
-        } = take;
-        let number = index + 1;
-        line(
-            &mut text,
-            format!(
-                "{number:>3}  {name:32} {frames:>6} frames  {fps:>6.1} Hz  {duration_s:>7.2} s"
-            ),
-        );
+        line(&mut text, take_line(index + 1, take));
     }
     section(&mut text, "joint map");
-    for Row {
-        slot,
-        joint,
-        confidence,
-        reason,
-    } in &report.map
-    {
-        let percent = 100.0 * confidence;
-        line(
-            &mut text,
-            format!("     {slot:16} {joint:32} {percent:>3.0} %  {reason}"),
-        );
+    for row in &report.map {
+        line(&mut text, map_line(row));
     }
     if !report.problems.is_empty() {
         section(&mut text, "problems");
     }
-    for problem in &report.problems {
-        let severity = format!("{:?}", problem.severity).to_lowercase();
-        line(
-            &mut text,
-            format!("     {severity:8} {}: {}", problem.id, problem.message),
-        );
+    for Problem {
+        id,
+        severity,
+        message,
+        ..
+    } in &report.problems
+    {
+        let severity = format!("{severity:?}").to_lowercase();
+        line(&mut text, format!("     {severity:8} {id}: {message}"));
     }
     text
+}
+
+fn take_line(number: usize, take: &TakeInfo) -> String {
+    let TakeInfo {
+        name,
+        fps,
+        frames,
+        duration_s,
+        ..
+    } = take;
+    format!("{number:>3}  {name:32} {frames:>6} frames  {fps:>6.1} Hz  {duration_s:>7.2} s")
+}
+
+fn map_line(row: &Row) -> String {
+    let Row {
+        slot,
+        joint,
+        confidence,
+        reason,
+    } = row;
+    let percent = 100.0 * confidence;
+    format!("     {slot:16} {joint:32} {percent:>3.0} %  {reason}")
 }
 
 fn section(text: &mut String, title: &str) {

@@ -153,51 +153,48 @@ fn text(report: &Report) -> String {
 
 /// The tracks as comma-separated values, a row per frame.
 fn table(motion: &Motion) -> String {
-    let tracks = &motion.tracks;
-    let mut header: Vec<String> = ["frame", "time_s", "phase"].map(String::from).into();
-    for name in ["com", "com_velocity", "linear_momentum", "angular_momentum"] {
-        header.extend(["x", "y", "z"].map(|axis| format!("{name}_{axis}")));
-    }
-    for name in ["unsupported_force", "unsupported_moment"] {
-        header.extend(["x", "y", "z"].map(|axis| format!("{name}_{axis}")));
-    }
-    header.extend(
-        motion
-            .contact_names()
-            .iter()
-            .map(|body| format!("contact_{body}")),
-    );
-    let mut text = header.join(",") + "\n";
+    let mut text = header(motion).join(",") + "\n";
     for frame in 0..motion.qpos.len() {
-        let mut row = vec![frame.to_string(), number(&(frame as f64 / motion.fps))];
-        row.extend(tracks.phase.get(frame).map(number));
-        for track in [
-            &tracks.com,
-            &tracks.com_velocity,
-            &tracks.linear_momentum,
-            &tracks.angular_momentum,
-        ] {
-            row.extend(track.get(frame).into_iter().flatten().map(number));
-        }
-        row.extend(
-            tracks
-                .root_wrench_residual
-                .get(frame)
-                .into_iter()
-                .flatten()
-                .map(number),
-        );
-        row.extend(
-            tracks
-                .contact
-                .get(frame)
-                .into_iter()
-                .flatten()
-                .map(|c| u8::from(*c).to_string()),
-        );
-        text += &(row.join(",") + "\n");
+        text += &(row(motion, frame).join(",") + "\n");
     }
     text
+}
+
+fn header(motion: &Motion) -> Vec<String> {
+    let mut header: Vec<String> = ["frame", "time_s", "phase"].map(String::from).into();
+    for name in [
+        "com",
+        "com_velocity",
+        "linear_momentum",
+        "angular_momentum",
+        "unsupported_force",
+        "unsupported_moment",
+    ] {
+        header.extend(["x", "y", "z"].map(|axis| format!("{name}_{axis}")));
+    }
+    let contacts = motion.contact_names();
+    header.extend(contacts.iter().map(|body| format!("contact_{body}")));
+    header
+}
+
+/// The values of one frame, in the order of the header.
+fn row(motion: &Motion, frame: usize) -> Vec<String> {
+    let tracks = &motion.tracks;
+    let mut row = vec![frame.to_string(), number(&(frame as f64 / motion.fps))];
+    row.extend(tracks.phase.get(frame).map(number));
+    for track in [
+        &tracks.com,
+        &tracks.com_velocity,
+        &tracks.linear_momentum,
+        &tracks.angular_momentum,
+    ] {
+        row.extend(track.get(frame).into_iter().flatten().map(number));
+    }
+    let wrench = tracks.root_wrench_residual.get(frame);
+    row.extend(wrench.into_iter().flatten().map(number));
+    let contacts = tracks.contact.get(frame).into_iter().flatten();
+    row.extend(contacts.map(|c| u8::from(*c).to_string()));
+    row
 }
 
 /// Six decimals, a micrometre of a length. Adding 0.0 turns a negative zero into a plain one.

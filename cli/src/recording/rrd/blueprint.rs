@@ -44,46 +44,10 @@ pub fn send(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResul
     Ok(())
 }
 
+/// The scene on the left, the plots on the right.
 fn log(layout: &Layout, shown: &Recording) -> RecordingStreamResult<()> {
     let scene = scene(layout, shown)?;
-    let mut plots = Vec::new();
-    if !shown.rewards.is_empty() {
-        plots.push((
-            plot(
-                layout,
-                2,
-                "reward terms",
-                "plots/rewards",
-                Some([0.0, 1.0]),
-                Corner2D::LeftBottom,
-            )?,
-            3.6,
-        ));
-    }
-    let lanes = 0.6 + 0.45 * (shown.contact_parts.len() * shown.actors().count()) as f32;
-    let contacts = layout.view(3, "StateTimeline", "ground contact", "plots/contacts")?;
-    plots.push((contacts, lanes));
-    for (number, name, origin, range, share) in [
-        (
-            4,
-            "height of the centre of mass, m",
-            "plots/com_height",
-            None,
-            2.0,
-        ),
-        (
-            5,
-            "angular momentum, kg·m²/s",
-            "plots/angular_momentum",
-            None,
-            2.0,
-        ),
-        (6, "phase", "plots/phase", Some([0.0, 1.0]), 1.2),
-    ] {
-        let view = plot(layout, number, name, origin, range, Corner2D::LeftTop)?;
-        plots.push((view, share));
-    }
-    let (views, shares): (Vec<_>, Vec<_>) = plots.into_iter().unzip();
+    let (views, shares): (Vec<_>, Vec<_>) = plots(layout, shown)?.into_iter().unzip();
     let side = layout.container(100, ContainerKind::Vertical, &views, |c| {
         c.with_row_shares(shares)
     })?;
@@ -93,6 +57,32 @@ fn log(layout: &Layout, shown: &Recording) -> RecordingStreamResult<()> {
     })?;
     layout.viewport(101)?;
     layout.panels(shown.fps)
+}
+
+/// The views of the plots, each with its share of the height.
+fn plots(layout: &Layout, shown: &Recording) -> RecordingStreamResult<Vec<(String, f32)>> {
+    let mut plots = Vec::new();
+    let unit = Some([0.0, 1.0]);
+    if !shown.rewards.is_empty() {
+        let legend = Corner2D::LeftBottom;
+        let view = plot(layout, 2, "reward terms", "plots/rewards", unit, legend)?;
+        plots.push((view, 3.6));
+    }
+    // A lane for every body of every character, and the heading.
+    let lanes = 0.6 + 0.45 * (shown.contact_parts.len() * shown.actors().count()) as f32;
+    let contacts = layout.view(3, "StateTimeline", "ground contact", "plots/contacts")?;
+    plots.push((contacts, lanes));
+    let height = "height of the centre of mass, m";
+    let momentum = "angular momentum, kg·m²/s";
+    for (number, name, origin, range, share) in [
+        (4, height, "plots/com_height", None, 2.0),
+        (5, momentum, "plots/angular_momentum", None, 2.0),
+        (6, "phase", "plots/phase", unit, 1.2),
+    ] {
+        let view = plot(layout, number, name, origin, range, Corner2D::LeftTop)?;
+        plots.push((view, share));
+    }
+    Ok(plots)
 }
 
 fn scene(layout: &Layout, shown: &Recording) -> RecordingStreamResult<String> {

@@ -77,51 +77,48 @@ fn shapes(
 ) -> RecordingStreamResult<()> {
     let dress: fn(Side) -> Rgba = if lead { look::solid } else { look::ghost };
     let color = look::color(dress(part.side));
-    let mut balls = (Vec::new(), Vec::new());
-    let mut rods = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut boxes = (Vec::new(), Vec::new(), Vec::new());
+    let (mut centers, mut radii) = (Vec::new(), Vec::new());
+    let (mut rods, mut thicknesses, mut lengths) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut boxes, mut halves) = (Vec::new(), Vec::new());
     for shape in &part.shapes {
         match shape {
             Shape::Sphere { center, radius } => {
-                balls.0.push(vec3(center));
-                balls.1.push(*radius as f32);
+                centers.push(vec3(center));
+                radii.push(*radius as f32);
             }
             Shape::Capsule { a, b, radius } => {
-                let (place, turn) = place_and_turn(&along(a, b));
-                rods.0.push((b - a).norm() as f32);
-                rods.1.push(*radius as f32);
-                rods.2.push(place);
-                rods.3.push(turn);
+                rods.push(place_and_turn(&along(a, b)));
+                thicknesses.push(*radius as f32);
+                lengths.push((b - a).norm() as f32);
             }
             Shape::Box { pose, half } => {
-                let (place, turn) = place_and_turn(pose);
-                boxes.0.push(place);
-                boxes.1.push(vec3(half));
-                boxes.2.push(turn);
+                boxes.push(place_and_turn(pose));
+                halves.push(vec3(half));
             }
         }
     }
-    if !balls.0.is_empty() {
-        let balls = Ellipsoids3D::from_centers_and_radii(balls.0, balls.1);
-        let balls = balls.with_colors([color]).with_fill_mode(FillMode::Solid);
-        stream.log_static(path, &balls)?;
+    if !centers.is_empty() {
+        let balls = Ellipsoids3D::from_centers_and_radii(centers, radii).with_colors([color]);
+        stream.log_static(path, &balls.with_fill_mode(FillMode::Solid))?;
     }
-    if !rods.0.is_empty() {
-        let rods = Capsules3D::from_lengths_and_radii(rods.0, rods.1)
-            .with_translations(rods.2)
-            .with_quaternions(rods.3);
+    if !rods.is_empty() {
+        let (places, turns): (Vec<_>, Vec<_>) = rods.into_iter().unzip();
+        let rods = Capsules3D::from_lengths_and_radii(lengths, thicknesses)
+            .with_translations(places)
+            .with_quaternions(turns);
         let rods = rods.with_colors([color]).with_fill_mode(FillMode::Solid);
         stream.log_static(path, &rods)?;
     }
-    if !boxes.0.is_empty() {
-        let boxes =
-            Boxes3D::from_centers_and_half_sizes(boxes.0, boxes.1).with_quaternions(boxes.2);
+    if !boxes.is_empty() {
+        let (places, turns): (Vec<_>, Vec<_>) = boxes.into_iter().unzip();
+        let boxes = Boxes3D::from_centers_and_half_sizes(places, halves).with_quaternions(turns);
         let boxes = boxes.with_colors([color]).with_fill_mode(FillMode::Solid);
         stream.log_static(path, &boxes)?;
     }
     Ok(())
 }
 
+/// Draws the centre of mass, the specks around it that the eye follows, and the angular momentum about it.
 fn momentum(
     stream: &RecordingStream,
     branch: &str,
@@ -132,44 +129,42 @@ fn momentum(
 ) -> RecordingStreamResult<()> {
     let color = look::color(look::of_actor(name));
     let path = format!("{branch}/com");
-    stream.log_static(
-        path.as_str(),
-        &Points3D::update_fields()
-            .with_colors([color])
-            .with_radii([0.025]),
-    )?;
-    let framed = Vector3::from(FRAMED);
-    let specks: Vec<_> = actor
-        .com
-        .iter()
-        .flat_map(|com| [vec3(&(com - framed)), vec3(&(com + framed))])
-        .collect();
-    let lengths = vec![2; actor.com.len()];
-    let specks = Points3D::update_fields()
-        .with_positions(specks)
-        .columns(lengths)?;
-    let speck = Points3D::update_fields().with_radii([0.0002]);
-    stream.log_static(format!("{branch}/{FOLLOWED}"), &speck)?;
-    stream.send_columns(format!("{branch}/{FOLLOWED}"), times.to_vec(), specks)?;
+    let style = Points3D::update_fields().with_colors([color]);
+    stream.log_static(path.as_str(), &style.with_radii([0.025]))?;
+    followed(stream, branch, actor, times)?;
 
     let com = actor.com.iter().map(vec3);
     let points = Points3D::update_fields().with_positions(com.clone());
     stream.send_columns(path, times.to_vec(), points.columns_of_unit_batches()?)?;
 
     let path = format!("{branch}/angular_momentum");
-    stream.log_static(
-        path.as_str(),
-        &Arrows3D::update_fields()
-            .with_colors([color])
-            .with_radii([0.012]),
-    )?;
-    let arrows = Arrows3D::update_fields().with_origins(com).with_vectors(
-        actor
-            .angular_momentum
-            .iter()
-            .map(|l| vec3(&(l / per_meter))),
-    );
+    let style = Arrows3D::update_fields().with_colors([color]);
+    stream.log_static(path.as_str(), &style.with_radii([0.012]))?;
+    let momenta = actor.angular_momentum.iter();
+    let arrows = Arrows3D::update_fields()
+        .with_origins(com)
+        .with_vectors(momenta.map(|l| vec3(&(l / per_meter))));
     stream.send_columns(path, times.to_vec(), arrows.columns_of_unit_batches()?)
+}
+
+/// Draws the two specks whose bounds the eye follows; they are too small to be seen.
+fn followed(
+    stream: &RecordingStream,
+    branch: &str,
+    actor: &Actor,
+    times: &[TimeColumn],
+) -> RecordingStreamResult<()> {
+    let framed = Vector3::from(FRAMED);
+    let pair = |com: &Vector3<f64>| [vec3(&(com - framed)), vec3(&(com + framed))];
+    let specks: Vec<_> = actor.com.iter().flat_map(pair).collect();
+    let lengths = vec![2; actor.com.len()];
+    let specks = Points3D::update_fields()
+        .with_positions(specks)
+        .columns(lengths)?;
+    let path = format!("{branch}/{FOLLOWED}");
+    let style = Points3D::update_fields().with_radii([0.0002]);
+    stream.log_static(path.as_str(), &style)?;
+    stream.send_columns(path, times.to_vec(), specks)
 }
 
 /// Draws a dot on the ground below every body that touches it.
