@@ -59,7 +59,10 @@ fn training_can_be_disturbed_and_is_measured_so() {
         "task.perturbations.mass=[2,1]",
     ];
     let said = bench.complaint(&wrong, 2);
-    assert!(said.contains("`task.perturbations.mass`: [2, 1] is not allowed"), "{said}");
+    assert!(
+        said.contains("`task.perturbations.mass`: [2, 1] is not allowed"),
+        "{said}"
+    );
 }
 
 /// The flag fills in what isn't said, and takes nothing back that is.
