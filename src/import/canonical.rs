@@ -11,7 +11,7 @@ use crate::clip::{Joint, Problem};
 use nalgebra::{Isometry3, UnitQuaternion};
 
 /// A rest pose is unusable where it is smaller than this fraction of the first frame's pose. Chosen: in such
-/// files all joints are in one place, but for rounding.
+/// files all joints are in one place, up to rounding.
 const COLLAPSED: f64 = 0.01;
 
 /// How many poses of a take tell which way the figure stands, ends included. Chosen: most of a motion must be upright,

@@ -18,7 +18,7 @@ pub struct Error {
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum ErrorKind {
-    /// The system didn't give the file.
+    /// The file can't be read.
     Read {
         /// What the system says.
         source: std::io::Error,

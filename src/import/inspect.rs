@@ -1,4 +1,4 @@
-//! What is in a file, told without sampling its motion.
+//! What is in a file, without sampling its motion.
 
 use super::canonical::Rig;
 use super::error::{ErrorKind, NoTakes};

@@ -1,4 +1,4 @@
-//! Which take of a file is meant.
+//! Which take of a file to read: the one that was asked for, or the one with the most motion.
 
 use super::error::ErrorKind;
 use super::names::first_few;

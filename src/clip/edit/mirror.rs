@@ -179,7 +179,7 @@ impl Clip {
         plane: &Plane,
     ) -> Vec<Isometry3<f64>> {
         let turns = self.turns(frame, rest);
-        // World rotation at rest of what a joint hangs on: shifts are mirrored in world axes.
+        // World rotation of a joint's parent at rest: shifts are mirrored in world axes.
         let under = |j: usize| {
             self.joints[j]
                 .parent

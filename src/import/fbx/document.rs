@@ -45,7 +45,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// Checks the header and gives the version, e.g. 7400.
+/// Checks the header and returns the version, e.g. 7400.
 fn version(bytes: &[u8]) -> Result<u32, FbxError> {
     let Some(rest) = bytes.strip_prefix(MAGIC) else {
         return Err(if is_ascii(bytes) {

@@ -84,7 +84,7 @@ impl<'d, 'a> Graph<'d, 'a> {
         let (Some(child), Some(parent)) = (object(1), object(2)) else {
             return;
         };
-        // An object hangs on an object (OO), or drives one of its properties (OP).
+        // An object is a child of another one (OO), or drives one of its properties (OP).
         let property = match record.text(0) {
             Some(b"OO") => None,
             Some(b"OP") => record.text(3),

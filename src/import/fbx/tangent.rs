@@ -13,7 +13,7 @@ const CLAMP_PROGRESSIVE: u32 = 0x4000;
 const WEIGHTED_RIGHT: u32 = 0x0100_0000;
 const WEIGHTED_NEXT_LEFT: u32 = 0x0200_0000;
 
-/// Weight of a tangent that isn't weighted: the Bezier handle stands at a third of the segment.
+/// Weight of a tangent that isn't weighted: the Bézier handle ends at a third of the segment.
 pub(super) const THIRD: f64 = 1.0 / 3.0;
 
 /// What the file says about one key: flags and four 32-bit values whose meaning depends on them.

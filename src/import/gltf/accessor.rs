@@ -14,7 +14,7 @@ use std::rc::Rc;
 const FREE_NUMBERS: usize = 1 << 16;
 const NUMBERS_PER_BYTE: usize = 4;
 /// Most numbers that all curves together may use, counting a shared accessor each time. Chosen, as a bound on time.
-const MOST_GIVEN: usize = 1 << 28;
+const MOST_USED: usize = 1 << 28;
 
 /// Reads accessors, each of them once.
 pub(super) struct Accessors<'a> {
@@ -23,8 +23,8 @@ pub(super) struct Accessors<'a> {
     done: BTreeMap<usize, Rc<[f64]>>,
     /// Numbers in memory.
     numbers: usize,
-    /// Numbers handed out, counting a shared accessor each time.
-    given: usize,
+    /// Numbers that curves use, counting a shared accessor each time.
+    used: usize,
 }
 
 /// Where the elements of an accessor lie in a buffer view.
@@ -45,7 +45,7 @@ impl<'a> Accessors<'a> {
             buffers,
             done: BTreeMap::new(),
             numbers: 0,
-            given: 0,
+            used: 0,
         }
     }
 
@@ -90,8 +90,8 @@ impl<'a> Accessors<'a> {
                 .into(),
         };
         self.done.insert(accessor, numbers.clone());
-        self.given = self.given.saturating_add(numbers.len());
-        if self.given > MOST_GIVEN {
+        self.used = self.used.saturating_add(numbers.len());
+        if self.used > MOST_USED {
             return Err(broken("it is shared implausibly often".into()));
         }
         Ok(numbers)

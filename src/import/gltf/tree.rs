@@ -105,8 +105,8 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
         let mark = bone.get_mut(node).ok_or_else(|| missing(node))?;
         *mark = true;
     }
-    let told = told(document);
-    let bone_of = |node| told.get(&node).copied().filter(|bone| !bone.is_empty());
+    let named = named(document);
+    let bone_of = |node| named.get(&node).copied().filter(|bone| !bone.is_empty());
     let about = |&node: &usize| {
         let source = &document.nodes[node];
         let holds = source.mesh.is_some() || source.camera.is_some() || document.is_light(node);
@@ -116,7 +116,7 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
                 .clone()
                 .unwrap_or_else(|| format!("node {node}")),
             parent: parents[node].map(|parent| place[parent]),
-            is_bone: bone[node] || told.contains_key(&node),
+            is_bone: bone[node] || named.contains_key(&node),
             is_plain: !holds,
             bone: bone_of(node).map(str::to_owned),
         }
@@ -131,15 +131,15 @@ pub(super) fn tree(document: &Document) -> Result<Tree, GltfError> {
 
 /// Nodes that an extension calls bones, and which bone each is, or nothing if the extension doesn't say. Each node and each bone
 /// counts once.
-fn told(document: &Document) -> BTreeMap<usize, &str> {
-    let (mut told, mut names) = (BTreeMap::new(), BTreeSet::new());
+fn named(document: &Document) -> BTreeMap<usize, &str> {
+    let (mut named, mut names) = (BTreeMap::new(), BTreeSet::new());
     let bones = document.extensions.iter().flat_map(Extensions::bones);
     for (node, bone) in bones {
-        if !told.contains_key(&node) && (bone.is_empty() || names.insert(bone)) {
-            told.insert(node, bone);
+        if !named.contains_key(&node) && (bone.is_empty() || names.insert(bone)) {
+            named.insert(node, bone);
         }
     }
-    told
+    named
 }
 
 fn missing(node: usize) -> GltfError {
