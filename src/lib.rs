@@ -50,6 +50,7 @@
 //! # }
 //! ```
 
+#![warn(missing_docs)]
 // A library reports through its results, never to a terminal.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 

@@ -66,7 +66,7 @@ impl Kernels {
 }
 
 /// The terms of one step, each in (0, 1]; those that the kernels don't have are 0. Formulas and scales are those of
-/// [`Kernels::Tracking`]; [`terms`](super::terms) says where the others differ.
+/// [`Kernels::Tracking`]; the functions beside it say where the others differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
     /// Mean squared joint rotation error, rad²; k = 6.
