@@ -30,7 +30,7 @@ pub struct ImportArgs {
     /// Take to read, by name or by number from 1; `mimic import` also accepts `all` [default: the take with most motion]
     #[arg(long, value_name = "TAKE")]
     take: Option<String>,
-    /// Frames per second to sample at; motions get a multiple of rates below 27 [default: the take's own rate]
+    /// Frames per second to sample at; below 27, a motion is sampled at a multiple of it [default: the take's own rate]
     #[arg(long, value_name = "HZ", value_parser = positive)]
     fps: Option<f64>,
     /// Part of the take to keep, in seconds from its start, e.g. 0.5..2, 1.. or ..2

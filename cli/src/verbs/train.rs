@@ -71,8 +71,8 @@ pub struct Args {
     /// Change one setting of the preset, e.g. `ppo.gamma=0.97`; can be repeated
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<String>,
-    /// Disturb training by shoves and by changed weight and friction; their ranges are those of the preset, or if it has none
-    /// the usual ones (`task.perturbations` in docs/settings.md)
+    /// Disturb training by shoves and by changed weight and friction. Ranges come from the preset; if it has none, from the
+    /// usual ones (`task.perturbations` in docs/settings.md)
     #[arg(long)]
     perturb: bool,
     /// Number of samples to learn from, e.g. 5M or 800k [default: that of the preset]
@@ -301,7 +301,7 @@ fn minutes(text: &str) -> Result<f64, String> {
 fn count(text: &str) -> Result<u64, String> {
     let (number, unit) = match text.trim_end_matches(['k', 'K', 'm', 'M']) {
         number if number.len() + 1 < text.len() => {
-            return Err(format!("`{text}` is not a number of samples"));
+            return Err("write a number such as 60k, 800k or 5M".to_owned());
         }
         number => (number, &text[number.len()..]),
     };

@@ -72,6 +72,7 @@ fn every_command_of_the_readme_works() {
         "kick.clip",
         "kick.motion",
         "kick.svg",
+        "kick-tracks.svg",
         "kick.rrd",
         "reference.rrd",
     ] {
