@@ -4,8 +4,7 @@
 //! and states, so that a skill learned in one can be performed in the other.
 //!
 //! ```
-//! use mimic::nalgebra::UnitQuaternion;
-//! use mimic::sim::{Character, LinkJoint, Settings, Target, World};
+//! use mimic::sim::{Character, Settings, World};
 //! use mimic::skeleton::Skeleton;
 //!
 //! let skeleton = Skeleton::load("humanoid")?;
@@ -14,14 +13,7 @@
 //! let (qpos, qvel) = (skeleton.rest_qpos(), vec![0.0; skeleton.nv]);
 //! world.reset(&character.states(&skeleton, &qpos, &qvel));
 //!
-//! // The drives hold the rest pose for a third of a second.
-//! let rest = |joint: &LinkJoint| match joint {
-//!     LinkJoint::Free => Target::Free,
-//!     LinkJoint::Hinge { .. } => Target::Hinge(0.0),
-//!     _ => Target::Ball(UnitQuaternion::identity()),
-//! };
-//! let targets: Vec<Target> = character.links.iter().map(|link| rest(&link.joint)).collect();
-//! world.set_targets(&targets);
+//! // Until they are given targets, the drives hold the rest pose: here for a third of a second.
 //! for _ in 0..10 {
 //!     world.step()?;
 //! }

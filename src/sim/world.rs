@@ -73,7 +73,8 @@ impl World {
         }
     }
 
-    /// Sets the targets that the drives hold until the next call, one per link.
+    /// Sets the targets that the drives hold until the next call, one per link. Before the first call they hold every joint at
+    /// rest.
     pub fn set_targets(&mut self, targets: &[Target]) {
         match &mut self.backend {
             Backend::Articulated(engine) => engine.set_targets(targets),

@@ -38,7 +38,7 @@ impl State {
             rotations: vec![UnitQuaternion::identity(); nodes],
             angles: vec![0.0; nodes],
             velocity: vec![0.0; coordinates],
-            targets: vec![UnitQuaternion::identity(); nodes],
+            targets: tree.nodes.iter().map(|node| rest(&node.joint)).collect(),
             saturated: vec![0.0; coordinates],
             impulses: vec![Vector3::zeros(); tree.points()],
             pushes: Vec::new(),
@@ -87,10 +87,21 @@ impl State {
             match target {
                 Target::Free => {}
                 Target::Ball(turn) => *own = *turn,
-                Target::Hinge(angle) => {
-                    *own = UnitQuaternion::new_unchecked(Quaternion::from_real(*angle));
-                }
+                Target::Hinge(angle) => *own = of_angle(*angle),
             }
         }
     }
+}
+
+/// What a drive holds before it is given a target: the joint at rest.
+fn rest(joint: &Joint) -> UnitQuaternion<f32> {
+    match joint {
+        Joint::Hinge(..) => of_angle(0.0),
+        Joint::Free | Joint::Ball => UnitQuaternion::identity(),
+    }
+}
+
+/// A hinge's target among those of [`State::targets`], which are rotations.
+fn of_angle(angle: f32) -> UnitQuaternion<f32> {
+    UnitQuaternion::new_unchecked(Quaternion::from_real(angle))
 }

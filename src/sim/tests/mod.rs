@@ -29,6 +29,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 on_both_engines!(
     in_flight_gravity_alone_changes_momentum_while_limbs_move,
     a_reset_world_gives_the_bits_of_a_new_one,
+    drives_without_a_target_hold_the_rest_pose,
     a_held_pose_stands_on_the_ground,
     every_built_in_character_stands_in_its_rest_pose,
     starting_inside_the_ground_adds_no_energy,
@@ -188,6 +189,23 @@ fn a_reset_world_gives_the_bits_of_a_new_one(settings: Settings) {
         play(&mut used),
         "the second reset differs from the first"
     );
+}
+
+/// Of every kind of joint that the built-in characters have: balls, single hinges, and several hinges of one body.
+fn drives_without_a_target_hold_the_rest_pose(settings: Settings) {
+    for name in Skeleton::built_in() {
+        let skeleton = Skeleton::load(name).expect("a built-in character loads");
+        let character = Character::new(&skeleton).expect("it can be simulated");
+        let mut worlds = [(); 2].map(|()| World::new(&character, settings));
+        worlds[1].set_targets(&held(&character));
+        for world in &mut worlds {
+            world.reset(&standing(&character, 50.0));
+            for _ in 0..10 {
+                world.step().expect("flight stays finite");
+            }
+        }
+        assert_eq!(worlds[0].states(), worlds[1].states(), "{name}");
+    }
 }
 
 fn a_held_pose_stands_on_the_ground(settings: Settings) {
