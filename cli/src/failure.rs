@@ -4,6 +4,7 @@
 //! is added here is the name of the flag to change. Exit code 2 is for what the user can mend, 1 for work that failed.
 
 use mimic::explain::{Explain, Explanation, Fault, Parameter, Remedy};
+use mimic::file::unread;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::fmt::Display;
@@ -71,8 +72,7 @@ impl Failure {
 
     /// A file that may be there, but cannot be read.
     pub fn unreadable(file: &Path, cause: &io::Error) -> Self {
-        Self::input(file, format!("cannot be read ({cause})"))
-            .with_remedy("check the path and its permissions")
+        Self::new(unread(cause).file(file))
     }
 
     /// A file or folder that cannot be written.

@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use mimic::clip::{Clip, Problem};
+use mimic::file::text_at_most;
 use mimic::humanoid::HumanoidMap;
 use mimic::import;
 use mimic::motion::Motion;
@@ -149,7 +150,8 @@ impl Preparation {
         let Some(path) = &self.retarget.map else {
             return Ok(None);
         };
-        let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
+        let text = text_at_most(path, HumanoidMap::MOST_BYTES)
+            .map_err(|e| Failure::unreadable(path, &e))?;
         let map =
             HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::in_file(path, e))?;
         Ok(Some(map))

@@ -1,6 +1,7 @@
 //! What can be wrong with a file of tensors.
 
 use super::Format;
+use super::read::unread;
 use crate::explain::{Explain, Explanation, explained};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -24,9 +25,9 @@ pub enum Flaw {
     Read(io::Error),
     /// The system doesn't let us write the file.
     Write(io::Error),
-    /// The file is too large to be read.
+    /// The file would be too large to be read again, so it isn't written.
     TooLarge {
-        /// Most bytes that are read.
+        /// Most bytes that are read, of the file or of its header.
         most: u64,
     },
     /// The bytes aren't those of a whole safetensors file.
@@ -101,14 +102,13 @@ impl Explain for FileError {
             remedy,
         } = self.format;
         let told = match &self.flaw {
-            Flaw::Read(source) => Explanation::input(format!("cannot be read ({source})"))
-                .remedy("check the path and its permissions"),
+            Flaw::Read(source) => unread(source),
             Flaw::Write(source) => Explanation::work(format!("cannot be written ({source})"))
                 .remedy("check the path, its permissions and the free space"),
             Flaw::TooLarge { most } => Explanation::input(format!(
-                "the file has more than {most} bytes, the most that are read of a {name} file"
+                "this {name} is too large for a file: it would need more than {most} bytes, the most that can be read again"
             ))
-            .remedy(format!("check that it is a {name} file")),
+            .remedy("make it shorter, or lower its frame rate"),
             Flaw::Container { reason } => Explanation::input(format!(
                 "not a whole safetensors file ({reason}), it may be cut short"
             ))

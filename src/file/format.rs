@@ -1,7 +1,7 @@
 //! Formats of files and the one rule about their versions.
 
 use super::Flaw;
-use serde_json::Value;
+use serde::Deserialize;
 
 /// A format of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,17 +14,28 @@ pub struct Format {
     pub remedy: &'static str,
 }
 
+/// What a file says about its format. Everything else that it says is passed over.
+#[derive(Deserialize)]
+pub(super) struct Stamp {
+    pub format: String,
+    version: u64,
+}
+
+impl Stamp {
+    /// The stamp in a JSON object, if it is of this program: versions are counted from 1.
+    pub fn of(object: &str) -> Option<Self> {
+        let stamp: Self = serde_json::from_str(object).ok()?;
+        (stamp.version > 0).then_some(stamp)
+    }
+}
+
 impl Format {
-    /// Checks that an object whose `format` and `version` are given says that it has this format. Older versions can be
-    /// read, newer ones can't. A newer version may have changed anything else, so nothing else may be looked at before.
-    pub(crate) fn check(&self, stamped: &Value) -> Result<(), Flaw> {
-        let (format, version) = (&stamped["format"], &stamped["version"]);
-        let (Some(found), Some(version)) = (format.as_str(), version.as_u64()) else {
-            return Err(Flaw::Foreign);
-        };
-        if found != self.name {
-            let found = found.to_owned();
-            return Err(Flaw::OtherFormat { found });
+    /// Checks that a JSON object says that it has this format. Older versions can be read, newer ones can't. A newer
+    /// version may have changed anything else, so nothing else may be looked at before.
+    pub(super) fn check(&self, object: &str) -> Result<(), Flaw> {
+        let Stamp { format, version } = Stamp::of(object).ok_or(Flaw::Foreign)?;
+        if format != self.name {
+            return Err(Flaw::OtherFormat { found: format });
         }
         if version > self.version {
             return Err(Flaw::Newer { version });
@@ -47,19 +58,23 @@ mod tests {
         };
         for version in [1, 2, 3] {
             let stamped = json!({ "format": "clip", "version": version });
-            assert!(format.check(&stamped).is_ok(), "{version}");
+            assert!(format.check(&stamped.to_string()).is_ok(), "{version}");
         }
-        let newer = format.check(&json!({ "format": "clip", "version": 4, "fps": {} }));
+        let newer = format.check(r#"{ "format": "clip", "version": 4, "fps": {} }"#);
         assert!(matches!(newer, Err(Flaw::Newer { version: 4 })));
         // Another format has versions of its own.
-        let other = format.check(&json!({ "format": "motion", "version": 4 }));
+        let other = format.check(r#"{ "format": "motion", "version": 4 }"#);
         assert!(matches!(other, Err(Flaw::OtherFormat { found }) if found == "motion"));
         for foreign in [
             json!({}),
             json!([]),
+            json!({ "format": "clip", "version": 0 }),
             json!({ "format": "clip", "version": -1 }),
+            json!({ "format": "clip", "version": 1.0 }),
+            json!({ "format": ["clip"], "version": 1 }),
         ] {
-            assert!(matches!(format.check(&foreign), Err(Flaw::Foreign)));
+            let refused = format.check(&foreign.to_string());
+            assert!(matches!(refused, Err(Flaw::Foreign)), "{foreign}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Files: written so that nobody ever finds half of one, and one envelope for all that hold tensors.
+//! Files: read within bounds, written so that nobody ever finds half of one, and one envelope for all that hold tensors.
 //!
 //! Clips, motions, checkpoints and policies are safetensors files whose metadata has one key, `mimic`, with a JSON object
 //! that says `format` and `version`. Older versions stay readable. A newer one is refused before anything else in the file
@@ -6,10 +6,12 @@
 
 mod error;
 mod format;
+mod read;
 mod tensors;
 
 pub use error::{FileError, Flaw};
 pub use format::Format;
+pub use read::{read_at_most, text_at_most, unread};
 pub(crate) use tensors::{Reader, Writer, format_of, load};
 
 use std::fs::File;

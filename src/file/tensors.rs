@@ -1,20 +1,21 @@
 //! Files of named tensors: safetensors, whose metadata has one key, `mimic`, that holds a JSON object. The object has the
 //! fields `format` and `version`, and then those of the format.
 
-use super::{FileError, Flaw, Format};
+use super::format::Stamp;
+use super::{FileError, Flaw, Format, read_at_most};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::HashMap;
-use std::io::Read;
 use std::path::Path;
 
 /// The key of the metadata under which our JSON object stands.
 const KEY: &str = "mimic";
-/// Most bytes that are read of a file. Chosen: the largest clip, 20 million transforms of seven `f32`, has an eighth of
-/// that, so no file of ours is refused, and a path that is a mistake doesn't fill the memory.
+/// Most bytes that are written to a file, and read of one. Chosen: the largest clip, 20 million transforms of seven `f32`,
+/// has an eighth of that, and a path that is a mistake doesn't fill the memory.
 const MOST_BYTES: u64 = 4 << 30;
+/// Most bytes that a header has: `MAX_HEADER_SIZE` of the `safetensors` crate, which refuses longer ones.
+const MOST_HEADER_BYTES: u64 = 100_000_000;
 /// Bytes at the beginning of a file that say how long its header is.
 const LENGTH_BYTES: usize = 8;
 
@@ -93,7 +94,15 @@ impl Writer {
         });
         let views = views.collect::<Result<Vec<_>, _>>().map_err(container)?;
         let metadata = HashMap::from([(KEY.to_owned(), header)]);
-        serialize(views, Some(metadata)).map_err(container)
+        let length = self.tensors.iter().map(|(.., bytes)| bytes.len() as u64);
+        readable(length.sum::<u64>() + MOST_HEADER_BYTES, MOST_BYTES)?;
+        let too_long = Flaw::TooLarge {
+            most: MOST_HEADER_BYTES,
+        };
+        serialize(views, Some(metadata)).map_err(|error| match error {
+            SafeTensorError::HeaderTooLarge => too_long,
+            other => container(other),
+        })
     }
 
     /// Replaces the file `path` at once.
@@ -115,22 +124,17 @@ pub(crate) fn load<T>(
     format: Format,
     parse: impl FnOnce(&[u8]) -> Result<T, Flaw>,
 ) -> Result<T, FileError> {
-    let parsed = bytes_of(path).and_then(|bytes| parse(&bytes));
+    let bytes = read_at_most(path, MOST_BYTES).map_err(Flaw::Read);
+    let parsed = bytes.and_then(|bytes| parse(&bytes));
     parsed.map_err(|flaw| flaw.of(path, format))
 }
 
-/// The bytes of a file, as long as they aren't too many.
-fn bytes_of(path: &Path) -> Result<Vec<u8>, Flaw> {
-    let file = std::fs::File::open(path).map_err(Flaw::Read)?;
-    let length = file.metadata().map_err(Flaw::Read)?.len();
-    let mut bytes = Vec::with_capacity(length.min(MOST_BYTES) as usize);
-    // A device or a pipe says that its length is zero and can give bytes without end.
-    let mut some = file.take(MOST_BYTES + 1);
-    some.read_to_end(&mut bytes).map_err(Flaw::Read)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(Flaw::TooLarge { most: MOST_BYTES });
+/// Refuses a file that has more bytes than can be read again.
+fn readable(bytes: u64, most: u64) -> Result<(), Flaw> {
+    match bytes > most {
+        true => Err(Flaw::TooLarge { most }),
+        false => Ok(()),
     }
-    Ok(bytes)
 }
 
 /// A file's tensors and its metadata.
@@ -143,8 +147,7 @@ impl<'a> Reader<'a> {
     /// Checks that the bytes are a file of this format and of a version that can be read, and only then the container.
     pub(crate) fn open(bytes: &'a [u8], format: Format) -> Result<Self, Flaw> {
         let header = header(bytes)?;
-        let stamped = serde_json::from_str(&header).map_err(|_| Flaw::Foreign)?;
-        format.check(&stamped)?;
+        format.check(&header)?;
         Ok(Self {
             tensors: SafeTensors::deserialize(bytes).map_err(container)?,
             header,
@@ -219,23 +222,35 @@ fn header(bytes: &[u8]) -> Result<String, Flaw> {
         #[serde(rename = "__metadata__")]
         metadata: Option<Metadata>,
     }
-    let cut = || Flaw::Container {
-        reason: "the header is incomplete".to_owned(),
-    };
-    let (length, rest) = bytes.split_first_chunk::<LENGTH_BYTES>().ok_or_else(cut)?;
-    let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| cut())?;
-    let text = rest.get(..length).ok_or_else(cut)?;
-    let outer: Outer = serde_json::from_slice(text).map_err(|e| Flaw::Container {
-        reason: e.to_string(),
-    })?;
+    let length = header_length(bytes)?;
+    if length > MOST_HEADER_BYTES {
+        let reason = format!("a header of {length} bytes");
+        return Err(Flaw::Container { reason });
+    }
+    let text = bytes.get(LENGTH_BYTES..LENGTH_BYTES + length as usize);
+    let outer: Outer =
+        serde_json::from_slice(text.ok_or_else(cut)?).map_err(|e| Flaw::Container {
+            reason: e.to_string(),
+        })?;
     let ours = outer.metadata.and_then(|metadata| metadata.mimic);
     ours.ok_or(Flaw::Foreign)
 }
 
+/// Bytes of the header that a file begins with.
+fn header_length(bytes: &[u8]) -> Result<u64, Flaw> {
+    let length = bytes.first_chunk().ok_or_else(cut)?;
+    Ok(u64::from_le_bytes(*length))
+}
+
+fn cut() -> Flaw {
+    Flaw::Container {
+        reason: "the header is incomplete".to_owned(),
+    }
+}
+
 /// The format that a file of ours says it has, by name; `None` for bytes that aren't such a file.
 pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
-    let stamped: Value = serde_json::from_str(&header(bytes).ok()?).ok()?;
-    Some(stamped["format"].as_str()?.to_owned())
+    Some(Stamp::of(&header(bytes).ok()?)?.format)
 }
 
 fn container(error: SafeTensorError) -> Flaw {
@@ -249,7 +264,7 @@ mod tests {
     use super::*;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     const FORMAT: Format = Format {
         name: "clip",
@@ -333,12 +348,32 @@ mod tests {
             r#"{"__metadata__":{"format":"pt"}}"#,
             r#"{"__metadata__":{"mimic":"7"}}"#,
             r#"{"__metadata__":{"mimic":"not JSON"}}"#,
+            r#"{"__metadata__":{"mimic":"{\"format\":\"clip\",\"version\":0}"}}"#,
         ] {
             assert!(matches!(flaw(&bare(header)), Flaw::Foreign), "{header}");
         }
         for bytes in [&b""[..], b"PK\x03\x04", &[255; 64], &bare("[")] {
             assert!(matches!(flaw(bytes), Flaw::Container { .. }), "{bytes:?}");
         }
+        let mut long = bare("");
+        long.resize(LENGTH_BYTES + MOST_HEADER_BYTES as usize + 1, b' ');
+        long[..LENGTH_BYTES].copy_from_slice(&(MOST_HEADER_BYTES + 1).to_le_bytes());
+        assert!(matches!(flaw(&long), Flaw::Container { reason } if reason.contains("100000001")));
+    }
+
+    #[test]
+    fn what_could_not_be_read_again_is_not_written() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("walk.clip");
+        let mut writer = Writer::default();
+        writer.push("numbers", &[1], [1.0_f32]);
+        let name = "x".repeat(MOST_HEADER_BYTES as usize);
+        let refused = writer.save(&path, FORMAT, &json!({ "name": name }));
+        let error = refused.expect_err("its header is too long");
+        assert!(matches!(error.flaw, Flaw::TooLarge { .. }), "{error}");
+        assert!(!path.exists());
+        assert!(readable(MOST_BYTES, MOST_BYTES).is_ok());
+        assert!(readable(MOST_BYTES + 1, MOST_BYTES).is_err());
     }
 
     #[test]

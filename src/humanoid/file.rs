@@ -5,6 +5,9 @@ use crate::clip::Joint;
 use std::collections::BTreeMap;
 
 impl HumanoidMap {
+    /// Most bytes that a map's file may have. Chosen: a map is two dozen names, and a longer file is a mistake.
+    pub const MOST_BYTES: u64 = 1 << 20;
+
     /// The map as JSON text to edit: an object from slot to the joint's name in `joints`, in the order of the slots.
     pub fn to_json(&self, joints: &[Joint]) -> String {
         let names = self.matches.iter().filter_map(|(slot, found)| {

@@ -2,6 +2,7 @@
 
 use crate::clip;
 use crate::explain::{Explain, Explanation, Parameter, explained};
+use crate::file::unread;
 use crate::humanoid;
 use std::path::PathBuf;
 
@@ -22,13 +23,6 @@ pub enum ErrorKind {
     Read {
         /// What the system says.
         source: std::io::Error,
-    },
-    /// The file is larger than what is read.
-    TooLarge {
-        /// Bytes of the file.
-        size: u64,
-        /// Most bytes that are read.
-        limit: u64,
     },
     /// The file has no format that can be read, or breaks its format, or the take that was asked for does. The
     /// explanation says where and what to do; it names a file of its own where a file beside the imported one is at fault.
@@ -123,12 +117,7 @@ impl ErrorKind {
         let wrong = |cause: String| Explanation::input(cause);
         let in_take = |take: &str, cause| wrong(cause).place(format!("take `{take}`"));
         match self {
-            Self::Read { source } => wrong(format!("cannot be read ({source})"))
-                .remedy("check the path and its permissions"),
-            Self::TooLarge { size, limit } => wrong(format!(
-                "its {size} bytes are more than the {limit} that can be read"
-            ))
-            .remedy("split the file"),
+            Self::Read { source } => unread(source),
             Self::Malformed(explanation) => (**explanation).clone(),
             Self::NoTakes(NoTakes { cause, remedy }) => {
                 wrong(format!("the file {cause}")).remedy(remedy)

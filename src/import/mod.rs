@@ -40,6 +40,7 @@ pub use options::Options;
 
 use crate::clip::Clip;
 use crate::clip::edit::Plane;
+use crate::file;
 use crate::humanoid;
 use detect::Format;
 use error::malformed;
@@ -154,13 +155,5 @@ fn open(bytes: &[u8], file: &str, folder: Option<&Path>) -> Result<Box<dyn Scene
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, ErrorKind> {
-    let unread = |source| ErrorKind::Read { source };
-    let size = std::fs::metadata(path).map_err(unread)?.len();
-    if size > MOST_BYTES {
-        return Err(ErrorKind::TooLarge {
-            size,
-            limit: MOST_BYTES,
-        });
-    }
-    std::fs::read(path).map_err(unread)
+    file::read_at_most(path, MOST_BYTES).map_err(|source| ErrorKind::Read { source })
 }

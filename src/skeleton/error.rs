@@ -2,6 +2,7 @@
 
 use super::Skeleton;
 use crate::explain::{Explain, Explanation, Parameter, explained};
+use crate::file::unread;
 use std::path::{Path, PathBuf};
 
 /// Why a skeleton could not be loaded.
@@ -85,13 +86,10 @@ impl Explain for SkeletonError {
         let built_in = || Skeleton::built_in().collect::<Vec<_>>().join(", ");
         match self {
             Self::Read { path, source } => {
-                let advice = format!(
-                    "check the path and its permissions, or use a built-in character: {}",
-                    built_in()
-                );
-                Explanation::input(format!("cannot be read ({source})"))
-                    .file(path)
-                    .remedy_by(Parameter::Skeleton, advice)
+                let told = unread(source).file(path);
+                let advice = told.remedy.as_ref().map_or("", |remedy| &remedy.advice);
+                let advice = format!("{advice}, or use a built-in character: {}", built_in());
+                told.remedy_by(Parameter::Skeleton, advice)
             }
             Self::UnknownName { name } => {
                 let advice = format!("use one of {}, or an MJCF file (.xml)", built_in());

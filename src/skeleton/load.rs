@@ -6,9 +6,14 @@
 use super::build::{self, Built};
 use super::error::{Defect, SkeletonError};
 use super::{Skeleton, guard, slots};
+use crate::file;
 use mjcf_rs::Model;
 use sha2::{Digest, Sha256};
 use std::path::Path;
+
+/// Most bytes that are read of an MJCF file or of the slots beside it. Chosen: the largest humanoids of MuJoCo Menagerie
+/// have fifty thousand, and the parser takes a multiple of that in memory and time.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// Characters compiled into the library: name, MJCF, slots as JSON.
 const BUILT_IN: [(&str, &str, &str); 3] = [
@@ -57,7 +62,7 @@ impl Skeleton {
         }
         let xml = read(path)?;
         let beside = path.with_extension("json");
-        let json = beside.is_file().then(|| read(&beside)).transpose()?;
+        let json = beside.exists().then(|| read(&beside)).transpose()?;
         let name = path.file_stem().unwrap_or(path.as_os_str());
         Self::from_mjcf(&name.to_string_lossy(), &xml, json.as_deref())
             .map_err(|error| error.in_files(path, &beside))
@@ -105,7 +110,7 @@ impl Skeleton {
 }
 
 fn read(path: &Path) -> Result<String, SkeletonError> {
-    std::fs::read_to_string(path).map_err(|source| SkeletonError::Read {
+    file::text_at_most(path, MOST_BYTES).map_err(|source| SkeletonError::Read {
         path: path.to_owned(),
         source,
     })

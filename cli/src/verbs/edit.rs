@@ -9,6 +9,7 @@ use crate::printer::Printer;
 use mimic::clip::Clip;
 use mimic::clip::edit::Plane;
 use mimic::explain::Explain;
+use mimic::file::text_at_most;
 use mimic::humanoid::{self, HumanoidMap};
 use mimic::import;
 use std::path::{Path, PathBuf};
@@ -164,7 +165,8 @@ impl Edits {
 
     fn map(&self, clip: &Clip, input: &Path) -> Outcome<HumanoidMap> {
         if let Some(path) = &self.map {
-            let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
+            let text = text_at_most(path, HumanoidMap::MOST_BYTES)
+                .map_err(|e| Failure::unreadable(path, &e))?;
             return HumanoidMap::from_json(&text, &clip.joints)
                 .map_err(|e| Failure::in_file(path, e));
         }

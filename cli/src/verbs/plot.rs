@@ -5,6 +5,7 @@ use crate::locate;
 use crate::output;
 use crate::plot::curves::{self, Curve, Panel, Scale};
 use crate::printer::Printer;
+use mimic::file::text_at_most;
 use mimic::run::files;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -21,6 +22,10 @@ the end.";
 
 /// By default a curve is averaged over the run's length divided by this. Chosen: noise fades, and rises stay visible.
 const SMOOTH_POINTS: usize = 50;
+
+/// Most bytes that are read of a run's log or evaluation. Chosen: a line of a log has about five hundred, and no run has a
+/// million iterations.
+const MOST_BYTES: u64 = 1 << 30;
 
 /// The panels: field of metrics.jsonl, heading, scale.
 const FIGURES: [(&str, &str, Scale); 10] = [
@@ -107,7 +112,7 @@ impl Args {
 impl Log {
     fn read(folder: &Path) -> Outcome<Self> {
         let path = folder.join(files::METRICS);
-        let text = std::fs::read_to_string(&path)
+        let text = text_at_most(&path, MOST_BYTES)
             .map_err(|e| Failure::unreadable(&path, &e).with_remedy("train the run first"))?;
         let mut lines = Vec::new();
         // The last line has no end while it is being written.
@@ -162,10 +167,10 @@ impl Log {
 
 /// The evaluation of a run; an unfinished one has none.
 fn evaluation(path: &Path) -> Outcome<Option<Value>> {
-    if !path.is_file() {
+    if !path.exists() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::unreadable(path, &e))?;
+    let text = text_at_most(path, MOST_BYTES).map_err(|e| Failure::unreadable(path, &e))?;
     let value = serde_json::from_str(&text).map_err(|e| {
         Failure::input(path, format!("this is not an evaluation ({e})"))
             .with_remedy("write it again with `mimic eval`")

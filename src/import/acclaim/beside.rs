@@ -1,6 +1,7 @@
 //! Finds the skeleton of a motion in the folder beside it.
 
 use super::error::AcclaimError;
+use crate::file::read_at_most;
 use crate::import::names::stem;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -31,8 +32,11 @@ pub(super) fn skeleton(
             many => format!("none of the {many} .asf files beside it has its name"),
         })
     })?;
-    let bytes =
-        bytes(path).map_err(|e| missing(format!("`{}` can't be read ({e})", path.display())))?;
+    let unread = |source| AcclaimError::Unread {
+        path: path.clone(),
+        source,
+    };
+    let bytes = read_at_most(path, MOST_BYTES).map_err(unread)?;
     Ok((path.clone(), bytes))
 }
 
@@ -50,7 +54,7 @@ fn skeletons(folder: &Path) -> io::Result<Vec<PathBuf>> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         let extension = path.extension().unwrap_or_default();
-        if extension.eq_ignore_ascii_case("asf") && path.is_file() {
+        if extension.eq_ignore_ascii_case("asf") && !path.is_dir() {
             found.push(path);
         }
     }
@@ -75,14 +79,4 @@ fn belonging<'p>(file: &str, skeletons: &'p [PathBuf]) -> Option<&'p PathBuf> {
         }
     }
     skeletons.first().filter(|_| skeletons.len() == 1)
-}
-
-fn bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let size = std::fs::metadata(path)?.len();
-    if size > MOST_BYTES {
-        return Err(io::Error::other(format!(
-            "{size} bytes are more than the {MOST_BYTES} that are read"
-        )));
-    }
-    std::fs::read(path)
 }

@@ -1,6 +1,8 @@
 //! What can be wrong with a pair of Acclaim files.
 
 use crate::explain::{Explain, Explanation, explained};
+use crate::file::unread;
+use std::io;
 use std::path::PathBuf;
 
 /// Why an ASF or AMC file couldn't be read. Lines are counted from 1.
@@ -8,6 +10,8 @@ use std::path::PathBuf;
 pub(crate) enum AcclaimError {
     /// An AMC file whose skeleton isn't to be had. `wanted` is the name that it should have.
     NoSkeleton { reason: String, wanted: String },
+    /// The skeleton of an AMC file is there, and can't be read.
+    Unread { path: PathBuf, source: io::Error },
     /// The skeleton of an AMC file is broken.
     Skeleton {
         path: PathBuf,
@@ -39,6 +43,7 @@ impl Explain for AcclaimError {
                 "an AMC file is motion without a skeleton, and {reason}"
             ))
             .remedy(format!("put its skeleton beside it as {wanted}")),
+            Self::Unread { path, source } => unread(source).file(path),
             Self::Skeleton { path, source } => source.explain().file(path),
             Self::Unexpected {
                 line,

@@ -2,6 +2,7 @@
 
 use super::document::Document;
 use super::error::Fault;
+use crate::file;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -17,7 +18,6 @@ pub(super) struct Buffers<'a> {
     /// Where external buffers are.
     folder: Option<&'a Path>,
     fetched: BTreeMap<usize, Cow<'a, [u8]>>,
-    external_bytes: u64,
     /// Bytes read so far: all, and those from other files.
     bytes: usize,
     bytes_beside: usize,
@@ -30,7 +30,6 @@ impl<'a> Buffers<'a> {
             bin,
             folder,
             fetched: BTreeMap::new(),
-            external_bytes: 0,
             bytes: 0,
             bytes_beside: 0,
         }
@@ -91,20 +90,9 @@ impl<'a> Buffers<'a> {
             folder
         };
         let path = inside(folder, uri)?;
-        let missing = |e| missing(uri, &e);
-        let about = std::fs::metadata(&path).map_err(missing)?;
-        if !about.is_file() {
-            return Err(format!("`{uri}` isn't a file").into());
-        }
-        self.external_bytes = self.external_bytes.saturating_add(about.len());
-        if self.external_bytes > MOST_BYTES {
-            return Err(Fault::new(
-                format!("the file's buffers are larger than {MOST_BYTES} bytes"),
-                "split the file",
-            ));
-        }
-        let bytes = std::fs::read(&path).map_err(missing)?;
-        self.bytes_beside = self.bytes_beside.saturating_add(bytes.len());
+        let most = MOST_BYTES - self.bytes_beside as u64;
+        let bytes = file::read_at_most(&path, most).map_err(|e| unread(uri, &e))?;
+        self.bytes_beside += bytes.len();
         Ok(bytes)
     }
 }
@@ -113,6 +101,13 @@ fn missing(uri: &str, error: &std::io::Error) -> Fault {
     Fault::new(
         format!("`{uri}` can't be read ({error})"),
         "put it beside the file",
+    )
+}
+
+fn unread(uri: &str, error: &std::io::Error) -> Fault {
+    Fault::new(
+        format!("`{uri}`: {}", file::unread(error).cause),
+        "repair it, or export the file again",
     )
 }
 

@@ -3,11 +3,15 @@
 use super::setting;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
+use mimic::file::text_at_most;
 use mimic::run::{PRESETS, Plan, RunError, files, preset};
 use mimic::task::TaskSettings;
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// Most bytes that a file of settings may have. Chosen: a run's own has three thousand.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// The settings, and where they come from.
 pub struct Preset {
@@ -36,7 +40,7 @@ impl Preset {
             });
         }
         let file = file(Path::new(name))?;
-        let text = std::fs::read_to_string(&file).map_err(|e| Failure::unreadable(&file, &e))?;
+        let text = text_at_most(&file, MOST_BYTES).map_err(|e| Failure::unreadable(&file, &e))?;
         let plan = parse(&text).map_err(|e| {
             Failure::input(&file, format!("this is not a training plan: {e}"))
                 .with_remedy("compare it with `plan` in the config.json of a run")
