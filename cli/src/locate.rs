@@ -107,16 +107,12 @@ pub fn is_run(path: &Path) -> bool {
     path.join(files::CONFIG).is_file()
 }
 
-/// The run in `runs/` that learned last.
+/// The run in `runs/` that learned last. One that was never saved has nothing to show.
 pub fn newest_run() -> Option<PathBuf> {
-    let folders = entries(Path::new(RUNS)).filter(|path| is_run(path));
-    folders.max_by_key(|path| (run_time(path), path.clone()))
-}
-
-/// When a run learned last; before its first checkpoint, when it was made.
-fn run_time(run: &Path) -> Option<SystemTime> {
-    let files = [files::CHECKPOINT, files::METRICS, files::CONFIG];
-    files.iter().find_map(|file| modified(&run.join(file)))
+    let learned = |path: &PathBuf| modified(&path.join(files::CHECKPOINT));
+    let runs = entries(Path::new(RUNS)).filter(|path| is_run(path));
+    let runs = runs.filter_map(|path| Some((learned(&path)?, path)));
+    runs.max().map(|(_, path)| path)
 }
 
 fn newest_file(folders: &[&Path], extension: &str) -> Option<PathBuf> {

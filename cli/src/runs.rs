@@ -6,9 +6,9 @@ use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
 use mimic::evaluate::{Agent, Options, perform, perform_sequence};
-use mimic::run::{CaseEvaluation, Controller, Run};
+use mimic::run::{CaseEvaluation, Claim, Controller, Run};
 use mimic::task::{Episode, EpisodeStart, Perturbations};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Opens the run that `wanted` means. Left out, the newest run.
 pub fn open(wanted: Option<&Path>) -> Outcome<Run> {
@@ -16,14 +16,20 @@ pub fn open(wanted: Option<&Path>) -> Outcome<Run> {
     Ok(Run::open(folder)?)
 }
 
-/// A folder for a new run, named after what it learns: the first of NAME, NAME-2, … that does not exist.
-pub fn free_folder(name: &str) -> PathBuf {
+/// Claims a folder for a new run, named after what it learns: the first of NAME, NAME-2, … that is free.
+pub fn claim(name: &str) -> Outcome<Claim> {
     let runs = Path::new(locate::RUNS);
-    let numbered = (2..).map(|number| runs.join(format!("{name}-{number}")));
-    let mut folders = std::iter::once(runs.join(name)).chain(numbered);
-    folders
-        .find(|folder| !folder.exists())
-        .unwrap_or_else(|| runs.join(name))
+    let mut number = 1_u64;
+    loop {
+        let folder = match number {
+            1 => runs.join(name),
+            _ => runs.join(format!("{name}-{number}")),
+        };
+        match Claim::on(folder) {
+            Err(error) if error.is_taken() => number += 1,
+            claim => return Ok(claim?),
+        }
+    }
 }
 
 /// Evaluates every motion of a run.

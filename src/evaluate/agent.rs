@@ -31,6 +31,13 @@ pub enum EvaluateError {
     Learn(LearnError),
     /// The task couldn't do what it was asked for.
     Task(TaskError),
+    /// More control steps than can be kept.
+    TooLong {
+        /// How many were asked for.
+        steps: f64,
+        /// How many can be.
+        most: f64,
+    },
 }
 
 impl From<LearnError> for EvaluateError {
@@ -50,6 +57,10 @@ impl Explain for EvaluateError {
         match self {
             Self::Learn(error) => error.explain(),
             Self::Task(error) => error.explain(),
+            Self::TooLong { steps, most } => Explanation::input(format!(
+                "the episodes have {steps:.0} control steps, and at most {most:.0} can be kept"
+            ))
+            .remedy("choose fewer or shorter episodes"),
         }
     }
 }

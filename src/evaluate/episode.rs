@@ -6,6 +6,10 @@ use crate::task::{
     step, step_together,
 };
 
+/// Most control steps that are kept at a time. Chosen: ten times those of an evaluation with the default options. Kept, they
+/// take about 2 kB each.
+const MOST_STEPS: f64 = 500_000.0;
+
 /// One of the episodes that run together.
 struct Running {
     environment: Box<dyn Environment>,
@@ -19,7 +23,7 @@ struct Running {
 /// [`LANES`](crate::sim::LANES) episodes take little longer than one.
 ///
 /// # Errors
-/// A task of another shape than the agent's.
+/// A task of another shape than the agent's, or more steps than can be kept.
 pub fn perform<A: Agent>(
     agent: &A,
     starts: &[EpisodeStart],
@@ -28,6 +32,8 @@ pub fn perform<A: Agent>(
     let task = agent.task();
     let start = |start: &EpisodeStart| Running::new(task.as_ref(), start, seconds);
     let mut all: Vec<Running> = starts.iter().map(start).collect();
+    let steps = all.iter().map(|running| running.episode.possible as f64);
+    check_steps(steps.sum())?;
     let (mut memory, mut actions) = (A::Memory::default(), Vec::new());
     loop {
         let running = all.iter_mut().filter(|r| r.outcome == Outcome::Running);
@@ -49,6 +55,17 @@ pub fn perform<A: Agent>(
             let environment = running.environment.as_ref();
             keep(&mut running.episode, task.as_ref(), environment, &step);
         }
+    }
+}
+
+/// Checks that so many control steps can be kept.
+pub(super) fn check_steps(steps: f64) -> Result<(), EvaluateError> {
+    match steps <= MOST_STEPS {
+        true => Ok(()),
+        false => Err(EvaluateError::TooLong {
+            steps,
+            most: MOST_STEPS,
+        }),
     }
 }
 
@@ -112,6 +129,7 @@ pub fn perform_sequence<A: Agent>(
         let steps = duration.map_or(seconds, |s| s + 1.0) * task.control_hz();
         let steps = steps.round().clamp(1.0, environment.possible_steps()) as usize;
         episode.possible += steps;
+        check_steps(episode.possible as f64)?;
         for _ in 0..steps {
             if advance(environment.as_mut(), &mut episode)? {
                 return Ok((episode, part + 1));

@@ -1,7 +1,7 @@
 //! An evaluation: episodes from many starts, and what is measured over all of them.
 
 use super::agent::{Agent, EvaluateError};
-use super::episode::perform;
+use super::episode::{check_steps, perform};
 use crate::sim::LANES;
 use crate::task::{
     Episode, EpisodeStart, Failure, Good, Measure, Perturbations, StartState, Task, Unit, mean,
@@ -105,13 +105,21 @@ impl FailedEpisode {
 /// in parallel and are gathered in order.
 ///
 /// # Errors
-/// A task of another shape than the agent's.
+/// A task of another shape than the agent's, or more steps than can be kept.
 pub fn evaluate<A: Agent>(
     agent: &A,
     case: usize,
     options: &Options,
 ) -> Result<Evaluation, EvaluateError> {
     let count = options.episodes.max(1);
+    let passes = 1.0 + f64::from(u8::from(options.perturbations.is_some()));
+    let duration = agent
+        .task()
+        .cases()
+        .get(case)
+        .and_then(|case| case.duration_s);
+    let steps = duration.unwrap_or(options.seconds) * agent.task().control_hz();
+    check_steps((count as f64 * passes + 1.0) * steps)?;
     let start = |n: usize| StartState::Reference(n as f64 / count as f64);
     let phases = (0..count).map(|n| EpisodeStart::new(case, start(n)));
     let rest = EpisodeStart::new(case, StartState::Rest);
@@ -127,7 +135,7 @@ pub fn evaluate<A: Agent>(
         .par_chunks(LANES)
         .map(|starts| perform(agent, starts, options.seconds))
         .collect();
-    let episodes = episodes?.concat();
+    let episodes: Vec<Episode> = episodes?.into_iter().flatten().collect();
     Ok(gather(agent.task().as_ref(), count, &episodes))
 }
 

@@ -6,17 +6,27 @@
 
 mod error;
 mod format;
+mod lock;
 mod read;
 mod tensors;
 
 pub use error::{FileError, Flaw};
 pub use format::Format;
+pub use lock::{Holder, LOCK, Lock, LockError};
 pub use read::{read_at_most, text_at_most, unread};
 pub(crate) use tensors::{Reader, Writer, format_of, load};
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
+
+/// What the names of temporary files begin with.
+const TEMPORARY: &str = ".mimic-";
+
+/// Whether a file of this name is one that is being written, or was left by a process that was killed meanwhile.
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with(TEMPORARY)
+}
 
 /// Replaces the content of the file `path` by `bytes`, at once: they are written to a temporary file beside it, flushed to
 /// the disk, and renamed. A process that is killed in between leaves the old file, or none.
@@ -34,7 +44,7 @@ fn replace_by(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> i
         .filter(|parent| !parent.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".mimic-");
+    builder.prefix(TEMPORARY);
     // Temporary files are private by default; this one becomes a file like any other.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

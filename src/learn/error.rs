@@ -22,6 +22,11 @@ pub enum LearnError {
         /// Which number of the observation.
         column: usize,
     },
+    /// An action that isn't a number.
+    Action {
+        /// Which number of the action.
+        column: usize,
+    },
     /// A return or an advantage that isn't a number.
     NotFinite {
         /// What it is.
@@ -60,6 +65,10 @@ impl Explain for LearnError {
             Self::Observation { column } => {
                 Explanation::work(format!("observation {column} is not finite"))
                     .remedy("look for a simulation that diverged or a division by zero")
+            }
+            Self::Action { column } => {
+                Explanation::work(format!("action {column} of the policy is not finite"))
+                    .remedy("train the policy again")
             }
             Self::NotFinite { what, sample } => {
                 Explanation::work(format!("{what} are not finite at sample {sample}"))

@@ -72,6 +72,8 @@ pub struct Acted<'w, T> {
 /// than there is.
 const MAX_WIDTH: usize = 1 << 16;
 const MAX_LAYERS: usize = 16;
+/// Most parameters. Chosen: twenty times the largest network of the presets; a learner holds about ten numbers for each.
+const MAX_PARAMETERS: usize = 1 << 24;
 
 /// Rows in one pass of the critic. A product of larger matrices is cut into blocks by its size, which gives other bits.
 const CRITIC_ROWS: usize = 64;
@@ -80,7 +82,7 @@ impl Policy {
     /// The networks of this shape.
     ///
     /// # Errors
-    /// A width of 0 or above 65536, or more than 16 hidden layers.
+    /// A width of 0 or above 65536, more than 16 hidden layers, or more than 16,777,216 parameters.
     pub fn new(spec: PolicySpec) -> Result<Self, LearnError> {
         let widths = spec.hidden.iter().chain([&spec.observation, &spec.action]);
         for &width in widths {
@@ -102,11 +104,19 @@ impl Policy {
         }
         let actor = Mlp::new(spec.observation, &spec.hidden, spec.action, spec.activation);
         let critic = Mlp::new(spec.observation, &spec.hidden, 1, spec.activation);
-        Ok(Self {
+        let policy = Self {
             spec,
             actor,
             critic,
-        })
+        };
+        match policy.parameter_count() {
+            ..=MAX_PARAMETERS => Ok(policy),
+            count => Err(setting(
+                "hidden",
+                format!("a network of {count} parameters"),
+                format!("widths that make at most {MAX_PARAMETERS} of them"),
+            )),
+        }
     }
 
     /// The shape.
@@ -323,11 +333,11 @@ pub fn fill_normal<T: Scalar>(noise: &mut [T], rng: &mut ChaCha8Rng) {
     }
 }
 
-fn setting(name: &'static str, value: usize, range: &'static str) -> LearnError {
+fn setting(name: &str, value: impl ToString, allowed: impl Into<String>) -> LearnError {
     LearnError::Setting(OutOfRange {
         setting: name.to_owned(),
         value: value.to_string(),
-        allowed: range.to_owned(),
+        allowed: allowed.into(),
     })
 }
 

@@ -3,7 +3,7 @@
 use super::activation::Activation;
 use super::config::PpoConfig;
 use super::error::LearnError;
-use crate::schema;
+use crate::schema::{self, OutOfRange};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,24 +19,24 @@ pub struct TrainerSettings {
     pub hidden: Vec<usize>,
     /// Activation after every hidden layer.
     pub activation: Activation,
-    /// Environments that act side by side.
-    #[schemars(range(min = 1))]
+    /// Environments that act side by side. Together with `horizon` they give at most 524288 samples an iteration.
+    #[schemars(range(min = 1, max = 16384))]
     pub environments: usize,
     /// Environments that share a network call and physics steps. A multiple of 8 leaves no lane idle.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 16384))]
     pub group: usize,
     /// Control steps of each environment in an iteration, which is one batch.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 65536))]
     pub horizon: usize,
     /// Iterations after which all episodes begin anew. No episode is under way then, so that is where a run can be stopped and
     /// resumed to the same bits.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 1e6))]
     pub round: u64,
     /// Samples (control steps of one environment) after which training ends.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 1e15))]
     pub samples: u64,
     /// Action noise at the end, as a share of that at the start. It changes evenly over the samples.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0))]
     pub final_std: f64,
     /// Learning rate at the end, as a share of that at the start, where `ppo.target_kl` doesn't steer it. It changes evenly over
     /// the samples.
@@ -44,13 +44,36 @@ pub struct TrainerSettings {
     pub final_learning_rate: f64,
 }
 
+/// Most samples of an iteration, and most activations of a network that are in memory at a time. Chosen: four times the
+/// largest batch that is in use for such characters (131072, on a graphics card), and half a gigabyte for one network.
+const MOST_SAMPLES: usize = 1 << 19;
+const MOST_ACTIVATIONS: usize = 1 << 27;
+
 impl TrainerSettings {
-    /// Checks that all numbers are in their ranges.
+    /// Checks that all numbers are in their ranges, and that what they ask for together fits into memory.
     ///
     /// # Errors
     /// The first that isn't.
     pub fn check(&self) -> Result<(), LearnError> {
         schema::check(self, "")?;
-        self.ppo.check()
+        self.ppo.check()?;
+        // Within their ranges, none of these products overflows.
+        let samples = self.environments * self.horizon;
+        most("environments × horizon", samples, MOST_SAMPLES)?;
+        let widths: usize = self.hidden.iter().sum();
+        let activations = widths * samples.min(self.ppo.minibatch);
+        most("hidden × ppo.minibatch", activations, MOST_ACTIVATIONS)
     }
+}
+
+/// Checks that a product of settings isn't larger than `most`.
+fn most(setting: &str, value: usize, most: usize) -> Result<(), LearnError> {
+    if value <= most {
+        return Ok(());
+    }
+    Err(LearnError::Setting(OutOfRange {
+        setting: setting.to_owned(),
+        value: value.to_string(),
+        allowed: format!("settings whose product is at most {most}"),
+    }))
 }

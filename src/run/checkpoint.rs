@@ -235,19 +235,39 @@ fn parameters(reader: &Reader, prefix: &str, policy: &Policy) -> Result<Vec<f32>
     let mut values = Vec::new();
     for tensor in policy.tensors() {
         let shape: Vec<_> = tensor.shape.iter().copied().map(Some).collect();
-        values.extend(reader.tensor::<f32>(&format!("{prefix}{}", tensor.name), &shape)?);
+        let name = format!("{prefix}{}", tensor.name);
+        values.extend(finite(&name, reader.tensor::<f32>(&name, &shape)?)?);
     }
     Ok(values)
 }
 
 fn normalizer(reader: &Reader, policy: &Policy) -> Result<Normalizer, Flaw> {
     let columns = Some(policy.spec().observation);
-    let [count] = reader.array("normalizer.count")?;
+    let [count]: [f64; 1] = reader.array("normalizer.count")?;
+    let numbers = |name: &str| finite(name, reader.tensor(name, &[columns])?);
+    let squares = numbers("normalizer.squares")?;
+    if !count.is_finite() || count < 0.0 || squares.iter().any(|square| *square < 0.0) {
+        return Err(Flaw::in_tensor(
+            "normalizer.count",
+            "it counts no observations",
+        ));
+    }
     Ok(Normalizer {
         count,
-        mean: reader.tensor("normalizer.mean", &[columns])?,
-        squares: reader.tensor("normalizer.squares", &[columns])?,
+        mean: numbers("normalizer.mean")?,
+        squares,
     })
+}
+
+/// The values of a tensor, all of which have to be numbers: a network with one that isn't gives nothing else.
+fn finite<T: Copy + Into<f64>>(name: &str, values: Vec<T>) -> Result<Vec<T>, Flaw> {
+    match values.iter().position(|&value| !value.into().is_finite()) {
+        Some(at) => Err(Flaw::in_tensor(
+            name,
+            format!("value {at} is not a finite number"),
+        )),
+        None => Ok(values),
+    }
 }
 
 fn extra(reader: &Reader) -> Result<BTreeMap<String, Vec<f32>>, Flaw> {

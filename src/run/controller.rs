@@ -68,7 +68,11 @@ impl Agent for Controller {
         memory.normal.resize(memory.seen.len(), 0.0);
         environment.observe(&mut memory.seen);
         self.normalizer.apply(&memory.seen, &mut memory.normal)?;
-        self.policy
-            .mean(&self.parameters, &memory.normal, &mut memory.workspace)
+        let policy = &self.policy;
+        let action = policy.mean(&self.parameters, &memory.normal, &mut memory.workspace)?;
+        match action.iter().position(|a| !a.is_finite()) {
+            Some(column) => Err(LearnError::Action { column }),
+            None => Ok(action),
+        }
     }
 }

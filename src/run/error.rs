@@ -2,12 +2,12 @@
 
 use crate::evaluate::EvaluateError;
 use crate::explain::{Explain, Explanation, Fault, Parameter, explained};
-use crate::file::FileError;
+use crate::file::{FileError, Holder, LockError, unread};
 use crate::learn::LearnError;
 use crate::motion::MotionError;
 use crate::skeleton::SkeletonError;
 use crate::task::TaskError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a run can't be made, opened or go on.
 #[derive(Debug)]
@@ -28,6 +28,17 @@ pub enum RunError {
     },
     /// The folder of a new run holds a run already.
     Exists(PathBuf),
+    /// The folder of a new run holds other files.
+    NotEmpty(PathBuf),
+    /// The folder of a new run is a file, or lies in one.
+    NoFolder(PathBuf),
+    /// Another process trains the run, or is making one in the folder.
+    Held {
+        /// The folder.
+        path: PathBuf,
+        /// Who holds it.
+        holder: Holder,
+    },
     /// A folder that isn't a run.
     NoRun(PathBuf),
     /// A run without a policy: it was never saved.
@@ -44,11 +55,18 @@ pub enum RunError {
     /// A reference motion that can't be read or written.
     Motion(MotionError),
     /// A character that can't be used.
-    Skeleton(SkeletonError),
+    Skeleton {
+        /// The file that holds it.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: SkeletonError,
+    },
     /// Settings or motions from which no task can be built.
     Task(TaskError),
     /// Learning that can't begin or go on.
     Learn(LearnError),
+    /// An evaluation that can't be done.
+    Evaluate(EvaluateError),
 }
 
 macro_rules! from {
@@ -61,18 +79,42 @@ macro_rules! from {
     };
 }
 
-from!(FileError => File, MotionError => Motion, SkeletonError => Skeleton, TaskError => Task, LearnError => Learn);
+from!(FileError => File, MotionError => Motion, TaskError => Task, LearnError => Learn);
 
 impl From<EvaluateError> for RunError {
     fn from(error: EvaluateError) -> Self {
         match error {
             EvaluateError::Learn(error) => Self::Learn(error),
             EvaluateError::Task(error) => Self::Task(error),
+            EvaluateError::TooLong { .. } => Self::Evaluate(error),
         }
     }
 }
 
 impl RunError {
+    /// Why the folder `path` can't be locked.
+    pub(super) fn locked(path: &Path, error: LockError) -> Self {
+        let path = path.to_owned();
+        match error {
+            LockError::Held(holder) => Self::Held { path, holder },
+            LockError::System(source) => Self::Write { path, source },
+        }
+    }
+
+    /// The error of a character that the file `path` holds.
+    pub(super) fn in_skeleton(path: &Path) -> impl FnOnce(SkeletonError) -> Self {
+        let path = path.to_owned();
+        move |error| Self::Skeleton { path, error }
+    }
+
+    /// Whether the folder for a new run is in use, so that another one has to be found.
+    pub fn is_taken(&self) -> bool {
+        matches!(
+            self,
+            Self::Exists(_) | Self::NotEmpty(_) | Self::NoFolder(_) | Self::Held { .. }
+        )
+    }
+
     /// Whether a setting of the plan is at fault, so that the caller should say where it came from.
     pub fn is_setting(&self) -> bool {
         match self {
@@ -92,9 +134,7 @@ impl RunError {
 impl Explain for RunError {
     fn explain(&self) -> Explanation {
         match self {
-            Self::Read { path, source } => Explanation::input(format!("cannot be read ({source})"))
-                .file(path)
-                .remedy("check the path and its permissions"),
+            Self::Read { path, source } => unread(source).file(path),
             Self::Write { path, source } => {
                 Explanation::work(format!("cannot be written ({source})"))
                     .file(path)
@@ -106,6 +146,19 @@ impl Explain for RunError {
                     Parameter::Output,
                     "choose another folder, or resume that run",
                 ),
+            Self::NotEmpty(path) => Explanation::input(
+                "this folder holds other files, and a run wants a folder of its own",
+            )
+            .file(path)
+            .remedy_by(Parameter::Output, "choose a new or an empty folder"),
+            Self::NoFolder(path) => Explanation::input("this is a file, and a run is a folder")
+                .file(path)
+                .remedy_by(Parameter::Output, "choose another folder"),
+            Self::Held { path, holder } => {
+                Explanation::input(format!("another process is at work in this run ({holder})"))
+                    .file(path)
+                    .remedy("wait until it ends, or stop it")
+            }
             Self::NoRun(path) => Explanation::input("is not a run: it has no config.json")
                 .file(path)
                 .remedy("give the folder of a run"),
@@ -117,9 +170,18 @@ impl Explain for RunError {
                 .remedy("correct the file, or train a new run"),
             Self::File(error) => error.explain(),
             Self::Motion(error) => error.explain(),
-            Self::Skeleton(error) => error.explain(),
+            Self::Skeleton { path, error } => {
+                let told = error.explain();
+                let remedy = told.remedy.clone();
+                let told = told.file(path);
+                match remedy {
+                    Some(_) => told,
+                    None => told.remedy("train a new run"),
+                }
+            }
             Self::Task(error) => error.explain(),
             Self::Learn(error) => error.explain(),
+            Self::Evaluate(error) => error.explain(),
         }
     }
 }

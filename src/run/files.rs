@@ -1,5 +1,8 @@
 //! Names of the files in a run's folder.
 
+use crate::file::LOCK;
+use std::ffi::OsStr;
+
 /// Everything that decides what the run learns; every run has it, from its first moment.
 pub const CONFIG: &str = "config.json";
 /// What each iteration did, a line of JSON each.
@@ -20,4 +23,17 @@ pub const SLOTS: &str = "skeleton.json";
 /// The motion number `index`, which the run learns.
 pub fn reference(index: usize) -> String {
     format!("reference-{index}.motion")
+}
+
+/// Whether a run writes files of this name.
+pub(super) fn is_own(name: &OsStr) -> bool {
+    let fixed = [
+        CONFIG, METRICS, CHECKPOINT, POLICY, EVALUATION, RECORDING, SKELETON, SLOTS, LOCK,
+    ];
+    let name = name.to_string_lossy();
+    let numbered = name
+        .strip_prefix("reference-")
+        .and_then(|rest| rest.strip_suffix(".motion"));
+    let is_reference = numbered.is_some_and(|number| number.parse::<usize>().is_ok());
+    is_reference || fixed.contains(&&*name) || crate::file::is_temporary(&name)
 }

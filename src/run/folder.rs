@@ -5,6 +5,7 @@ use super::controller::Controller;
 use super::error::RunError;
 use super::files;
 use super::plan::Plan;
+use crate::file::{Lock, text_at_most};
 use crate::learn::{Metrics, Policy, PolicySpec, Trainer, TrainerState};
 use crate::motion::Motion;
 use crate::skeleton::Skeleton;
@@ -19,7 +20,7 @@ use std::sync::Arc;
 /// What `config.json` says.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RunConfig {
+pub(super) struct RunConfig {
     format: String,
     version: u32,
     skeleton: String,
@@ -40,53 +41,42 @@ struct PolicyDetails {
     observation: Vec<Block>,
 }
 
+impl RunConfig {
+    pub(super) fn new(skeleton: &str, motions: usize, plan: Plan) -> Self {
+        Self {
+            format: "run".to_owned(),
+            version: 1,
+            skeleton: skeleton.to_owned(),
+            motions: (0..motions).map(files::reference).collect(),
+            plan,
+        }
+    }
+
+    /// The text of the `config.json` in the folder `dir`.
+    pub(super) fn text(&self, dir: &Path) -> Result<String, RunError> {
+        serde_json::to_string_pretty(self).map_err(|e| corrupt(&dir.join(files::CONFIG), e))
+    }
+}
+
 /// A training run on disk.
 pub struct Run {
     dir: PathBuf,
+    /// Held while the run is trained.
+    pub(super) lock: Option<Lock>,
     plan: Plan,
     skeleton: Skeleton,
     motions: Vec<Motion>,
 }
 
+/// Most bytes that are read of the run's short files, and of its metrics. Chosen: a hundred times what is written of a plan or
+/// a character, and as many lines as two billion samples make by the default.
+const MOST_BYTES: u64 = 4 << 20;
+const MOST_METRICS: u64 = 1 << 30;
+
 /// Tensor of the checkpoint that says where episodes begin.
 const STARTS: &str = "starts";
 
 impl Run {
-    /// Makes a run in the folder `dir`, which is created. A plan that can't be trained leaves no folder behind.
-    ///
-    /// # Errors
-    /// A folder that holds a run already or can't be written, or a plan, a character or motions that can't be trained.
-    pub fn create(
-        dir: impl AsRef<Path>,
-        plan: Plan,
-        skeleton: Skeleton,
-        motions: Vec<Motion>,
-    ) -> Result<Self, RunError> {
-        let dir = dir.as_ref();
-        if dir.join(files::CONFIG).exists() {
-            return Err(RunError::Exists(dir.to_owned()));
-        }
-        check(&plan, &skeleton, &motions)?;
-        fs::create_dir_all(dir).map_err(unwritten(dir))?;
-        write(&dir.join(files::SKELETON), skeleton.mjcf.as_bytes())?;
-        write(&dir.join(files::SLOTS), skeleton.slots_json().as_bytes())?;
-        for (i, motion) in motions.iter().enumerate() {
-            motion.save(dir.join(files::reference(i)))?;
-        }
-        let config = RunConfig {
-            format: "run".to_owned(),
-            version: 1,
-            skeleton: skeleton.name.clone(),
-            motions: (0..motions.len()).map(files::reference).collect(),
-            plan,
-        };
-        let text = serde_json::to_string_pretty(&config)
-            .map_err(|e| corrupt(&dir.join(files::CONFIG), e))?;
-        write(&dir.join(files::CONFIG), text.as_bytes())?;
-        // Files hold single precision: only what is read back from them is learned, so that a resumed run sees the same.
-        Run::open(dir)
-    }
-
     /// Opens the run in `dir`.
     ///
     /// # Errors
@@ -98,16 +88,18 @@ impl Run {
             return Err(RunError::NoRun(dir.to_owned()));
         }
         let config = config(&path)?;
-        let mjcf = read(&dir.join(files::SKELETON))?;
-        let slots = read(&dir.join(files::SLOTS))?;
+        let mjcf = read(&dir.join(files::SKELETON), MOST_BYTES)?;
+        let slots = read(&dir.join(files::SLOTS), MOST_BYTES)?;
         let mut motions = Vec::new();
         for name in &config.motions {
             motions.push(Motion::load(dir.join(name))?);
         }
         Ok(Run {
             dir: dir.to_owned(),
+            lock: None,
             plan: config.plan,
-            skeleton: Skeleton::from_mjcf(&config.skeleton, &mjcf, Some(&slots))?,
+            skeleton: Skeleton::from_mjcf(&config.skeleton, &mjcf, Some(&slots))
+                .map_err(RunError::in_skeleton(&dir.join(files::SKELETON)))?,
             motions,
         })
     }
@@ -132,6 +124,23 @@ impl Run {
         &self.motions
     }
 
+    /// Whether the run was saved at least once, so that there is something to go on from.
+    pub fn is_saved(&self) -> bool {
+        self.dir.join(files::CHECKPOINT).exists()
+    }
+
+    /// Makes this process the only one that may change the run, until the run is dropped.
+    ///
+    /// # Errors
+    /// A run that another process holds, or a folder that can't be written.
+    pub fn hold(&mut self) -> Result<(), RunError> {
+        if self.lock.is_none() {
+            let lock = Lock::take(&self.dir).map_err(|e| RunError::locked(&self.dir, e))?;
+            self.lock = Some(lock);
+        }
+        Ok(())
+    }
+
     /// A trainer that goes on from the last checkpoint, or begins if there is none.
     ///
     /// # Errors
@@ -141,13 +150,15 @@ impl Run {
         let mut trainer = Trainer::new(self.plan.trainer(), task)?;
         let path = self.dir.join(files::CHECKPOINT);
         if path.exists() {
+            let checkpoint = Checkpoint::load(&path)?;
+            self.check_progress(&checkpoint, &path)?;
             let Checkpoint {
                 iteration,
                 learner,
                 normalizer,
                 mut tensors,
                 ..
-            } = Checkpoint::load(&path)?;
+            } = checkpoint;
             trainer.restore(TrainerState {
                 iteration,
                 learner,
@@ -155,8 +166,23 @@ impl Run {
                 starts: tensors.remove(STARTS).unwrap_or_default(),
             })?;
         }
-        self.trim_metrics(trainer.iteration())?;
         Ok(trainer)
+    }
+
+    /// Checks that a checkpoint is one of this run: its samples are those of its iterations.
+    fn check_progress(&self, checkpoint: &Checkpoint, path: &Path) -> Result<(), RunError> {
+        let (iteration, samples) = (checkpoint.iteration, checkpoint.samples);
+        let each = (self.plan.environments * self.plan.horizon) as u64;
+        if iteration.checked_mul(each) == Some(samples) {
+            return Ok(());
+        }
+        Err(RunError::Config {
+            path: path.to_owned(),
+            reason: format!(
+                "{samples} samples in {iteration} iterations don't fit the plan in {}",
+                files::CONFIG
+            ),
+        })
     }
 
     /// Saves checkpoint and policy, each in one step.
@@ -211,7 +237,7 @@ impl Run {
 
     /// Seconds of training so far, from the last line of `metrics.jsonl`; 0 before there is one.
     pub fn seconds(&self) -> f64 {
-        let text = fs::read_to_string(self.dir.join(files::METRICS)).unwrap_or_default();
+        let text = read(&self.dir.join(files::METRICS), MOST_METRICS).unwrap_or_default();
         let last = text.lines().last();
         let line = last.and_then(|line| serde_json::from_str::<Value>(line).ok());
         line.and_then(|line| line["seconds"].as_f64())
@@ -223,7 +249,7 @@ impl Run {
     /// # Errors
     /// A file that can't be written.
     pub fn write(&self, name: &str, text: &str) -> Result<(), RunError> {
-        write(&self.dir.join(name), text.as_bytes())
+        write(&self.dir.join(name), text)
     }
 
     /// The policy, ready to act.
@@ -238,14 +264,15 @@ impl Run {
         let file = PolicyFile::load(&path)?;
         let details: PolicyDetails =
             serde_json::from_value(file.details).map_err(|e| corrupt(&path, e))?;
-        let skeleton = Skeleton::from_mjcf(&details.skeleton, &details.mjcf, Some(&details.slots))?;
+        let skeleton = Skeleton::from_mjcf(&details.skeleton, &details.mjcf, Some(&details.slots))
+            .map_err(RunError::in_skeleton(&path))?;
         let task = build(&details.task, &skeleton, &self.motions)?;
         let (spec, parameters) = (file.spec, file.parameters);
         Ok(Controller::new(spec, parameters, &file.normalizer, task)?)
     }
 
     /// Drops the metrics of iterations after the checkpoint, which will be done again.
-    fn trim_metrics(&self, iteration: u64) -> Result<(), RunError> {
+    pub(super) fn trim_metrics(&self, iteration: u64) -> Result<(), RunError> {
         let path = self.dir.join(files::METRICS);
         if !path.exists() {
             return Ok(());
@@ -254,13 +281,13 @@ impl Run {
             serde_json::from_str::<Metrics>(line)
                 .is_ok_and(|metrics| metrics.iteration <= iteration)
         };
-        let text = read(&path)?;
+        let text = read(&path, MOST_METRICS)?;
         let kept: String = text
             .lines()
             .filter(known)
             .map(|line| format!("{line}\n"))
             .collect();
-        write(&path, kept.as_bytes())
+        write(&path, &kept)
     }
 }
 
@@ -275,7 +302,7 @@ fn build(
 }
 
 /// Checks that a plan can be trained: builds everything that training needs except the environments, which take longest.
-fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), RunError> {
+pub(super) fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), RunError> {
     plan.check()?;
     let task = build(&plan.task, skeleton, motions)?;
     let spec = PolicySpec {
@@ -294,7 +321,7 @@ fn config(path: &Path) -> Result<RunConfig, RunError> {
         path: path.to_owned(),
         reason,
     };
-    let text = read(path)?;
+    let text = read(path, MOST_BYTES)?;
     let fields: Value = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
     // A newer version may have other fields, so this comes first.
     let (format, version) = (&fields["format"], &fields["version"]);
@@ -307,10 +334,14 @@ fn config(path: &Path) -> Result<RunConfig, RunError> {
     let config: RunConfig = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
     config.plan.check().map_err(|e| wrong(e.to_string()))?;
     // A run can be moved, and must not read files outside its folder.
-    for name in &config.motions {
+    for (i, name) in config.motions.iter().enumerate() {
         let file = Path::new(name).file_name();
         if file.is_none_or(|file| file != name.as_str()) {
             return Err(wrong(format!("motion `{name}` is not a plain file name")));
+        }
+        // A short list could ask for one large file again and again.
+        if config.motions[..i].contains(name) {
+            return Err(wrong(format!("motion `{name}` is listed twice")));
         }
     }
     Ok(config)
@@ -330,13 +361,13 @@ fn corrupt(path: &Path, error: serde_json::Error) -> RunError {
     }
 }
 
-fn read(path: &Path) -> Result<String, RunError> {
-    fs::read_to_string(path).map_err(|source| RunError::Read {
+fn read(path: &Path, most: u64) -> Result<String, RunError> {
+    text_at_most(path, most).map_err(|source| RunError::Read {
         path: path.to_owned(),
         source,
     })
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    crate::file::replace(path, bytes).map_err(unwritten(path))
+pub(super) fn write(path: &Path, text: &str) -> Result<(), RunError> {
+    crate::file::replace(path, text.as_bytes()).map_err(unwritten(path))
 }

@@ -4,6 +4,7 @@
 //! [`Controller`] the trained policy, ready to act.
 
 mod checkpoint;
+mod claim;
 mod controller;
 mod error;
 mod evaluation;
@@ -14,6 +15,7 @@ mod presets;
 mod session;
 
 pub use checkpoint::{Checkpoint, PolicyFile};
+pub use claim::Claim;
 pub use controller::{Controller, Memory};
 pub use error::RunError;
 pub use evaluation::CaseEvaluation;

@@ -103,3 +103,38 @@ impl Plan {
         Ok(self.trainer().check()?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_settings_ask_for_together_is_bounded() {
+        let wrong = |change: fn(&mut Plan)| {
+            let mut plan = Plan::default();
+            change(&mut plan);
+            let checked = plan.trainer().check();
+            checked.err().map(|e| e.to_string()).unwrap_or_default()
+        };
+        assert_eq!(wrong(|_| {}), "");
+        assert_eq!(wrong(|p| p.environments = 8192), "");
+        for (name, change) in [
+            (
+                "setting `environments`",
+                (|p| p.environments = usize::MAX) as fn(&mut Plan),
+            ),
+            ("setting `horizon`", |p| p.horizon = 1 << 40),
+            ("setting `group`", |p| p.group = usize::MAX),
+            ("setting `environments × horizon`", |p| {
+                (p.environments, p.horizon) = (16384, 65536);
+            }),
+            ("setting `hidden × ppo.minibatch`", |p| {
+                p.hidden = vec![65536; 16];
+                (p.environments, p.ppo.minibatch) = (8192, 1_000_000_000);
+            }),
+        ] {
+            let said = wrong(change);
+            assert!(said.starts_with(name), "{name}: {said}");
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! The training of a run, round after round: each is saved at its end, and an evaluation follows the last.
 
+use super::checkpoint::PolicyFile;
 use super::error::RunError;
 use super::evaluation::CaseEvaluation;
 use super::files;
@@ -56,12 +57,15 @@ struct Clock {
 }
 
 impl Session {
-    /// Goes on with a run from its last checkpoint, or begins it if there is none.
+    /// Goes on with a run from its last checkpoint, or begins it if there is none. Until the session ends, no other process
+    /// can train the run.
     ///
     /// # Errors
-    /// A plan that can't be trained, or a broken checkpoint.
-    pub fn open(run: Run) -> Result<Self, RunError> {
+    /// A run that another process trains, a plan that can't be trained, or a broken checkpoint.
+    pub fn open(mut run: Run) -> Result<Self, RunError> {
+        run.hold()?;
         let trainer = run.trainer()?;
+        run.trim_metrics(trainer.iteration())?;
         let now = Instant::now();
         let clock = Clock {
             before: run.seconds(),
@@ -130,6 +134,18 @@ impl Session {
             std::fs::remove_file(self.run.dir().join(outdated)).ok();
         }
         self.run.save(&self.trainer)
+    }
+
+    /// Whether the run's policy file is whole and holds what was learned last. It can be lost, damaged, or older than the
+    /// checkpoint where a process was killed between the two.
+    pub fn has_policy(&self) -> bool {
+        let state = self.trainer.state();
+        let path = self.run.dir().join(files::POLICY);
+        PolicyFile::load(path).is_ok_and(|policy| {
+            (policy.spec, policy.parameters) == (state.learner.spec, state.learner.parameters)
+                && policy.normalizer == state.normalizer
+                && self.run.controller().is_ok()
+        })
     }
 
     /// Evaluates what was saved last and keeps the result in `eval.json`.

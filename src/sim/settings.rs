@@ -19,7 +19,7 @@ pub enum Engine {
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Control steps per second: how often the policy acts.
-    #[schemars(range(min = 1.0, max = 1e4), extend("x-unit" = "Hz"))]
+    #[schemars(range(min = 1.0, max = 1000.0), extend("x-unit" = "Hz"))]
     pub control_hz: f64,
     /// Physics steps per control step.
     #[schemars(range(min = 1, max = 1000))]

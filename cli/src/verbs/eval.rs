@@ -7,7 +7,7 @@ use crate::output;
 use crate::printer::Printer;
 use crate::runs;
 use mimic::evaluate::{FailedEpisode, Options};
-use mimic::run::{CaseEvaluation, Run};
+use mimic::run::{CaseEvaluation, Run, RunError};
 use mimic::task::{Measure, Unit};
 use std::path::{Path, PathBuf};
 
@@ -59,7 +59,7 @@ impl Args {
     /// Runs the command.
     pub fn run(self, printer: &Printer) -> Outcome {
         runs::use_threads(self.threads)?;
-        let run = runs::open(self.run.as_deref())?;
+        let mut run = runs::open(self.run.as_deref())?;
         let options = Options {
             episodes: self.episodes,
             seconds: self.seconds,
@@ -70,11 +70,16 @@ impl Args {
             .as_deref()
             .map(|out| place(out, &run))
             .transpose()?;
+        // Held from before the policy is read: the evaluation that is kept has to be that of the policy beside it.
+        let held = match out {
+            None if is_usual(&options) => Some(run.hold()),
+            _ => None,
+        };
         let results = runs::evaluate(&run, &options, printer)?;
         let kept = match out {
             Some(out) => write(&out, &results),
             None => {
-                keep(&run, &options, &results, printer);
+                keep(&run, held, &results, printer);
                 Ok(())
             }
         };
@@ -115,20 +120,33 @@ fn write(path: &Path, results: &[CaseEvaluation]) -> Outcome {
     output::write_whole(path, CaseEvaluation::text(results).as_bytes())
 }
 
-/// Keeps an evaluation with the default options in the run. A run that cannot be written, such as that of another user, can
-/// still be evaluated.
-fn keep(run: &Run, options: &Options, results: &[CaseEvaluation], printer: &Printer) {
+/// Whether these are the options by which runs are compared.
+fn is_usual(options: &Options) -> bool {
     let usual = Options {
         perturbations: options.perturbations,
         ..Options::default()
     };
-    if *options != usual {
-        printer.note(format!(
+    *options == usual
+}
+
+/// Keeps an evaluation in the run, if that was meant to be `held` for it. A run that cannot be written, such as that of another
+/// user, can still be evaluated.
+fn keep(
+    run: &Run,
+    held: Option<Result<(), RunError>>,
+    results: &[CaseEvaluation],
+    printer: &Printer,
+) {
+    let Some(held) = held else {
+        return printer.note(format!(
             "the eval.json of `{}` stays as it is, because the options differ from the default; `--out FILE` writes a file",
             run.dir().display()
         ));
-    } else if let Err(error) = run.keep_evaluation(results) {
-        printer.warn(format!("{error}, or write it elsewhere with `--out FILE`"));
+    };
+    if let Err(error) = held.and_then(|()| run.keep_evaluation(results)) {
+        printer.warn(format!(
+            "the evaluation is not kept: {error}, or write it elsewhere with `--out FILE`"
+        ));
     }
 }
 

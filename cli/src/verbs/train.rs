@@ -14,7 +14,7 @@ use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use mimic::run::{Run, Session, files};
+use mimic::run::{Claim, Run, RunError, Session, files};
 use mimic::task::{TASKS, TaskError};
 use preset::Preset;
 use progress::Progress;
@@ -124,6 +124,17 @@ impl Args {
             Some(run) => runs::open(Some(run))?,
             None => self.create(library, printer)?,
         };
+        let folder = run.dir().to_owned();
+        let outcome = self.learn(run, threads, printer);
+        if outcome.is_err() && self.resume.is_none() {
+            // Unless something was saved, there is nothing that a later command could use.
+            Run::discard(folder);
+        }
+        outcome
+    }
+
+    /// Trains the run, or makes up for what is missing of its results.
+    fn learn(&self, run: Run, threads: usize, printer: &Printer) -> Outcome {
         let config = run.dir().join(files::CONFIG);
         let session = Session::open(run);
         let mut session = session.map_err(|e| preset::failure(Some(&config), e))?;
@@ -146,11 +157,12 @@ impl Args {
         }
     }
 
-    /// Makes the run. Everything that it needs is read and checked before its folder appears.
+    /// Makes the run. Its folder is claimed first, so that another process doesn't take it meanwhile, and is removed again if
+    /// something that the run needs can't be had.
     fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
         let preset = self.preset()?;
         let preparations = self.preparations(library, preset.skeleton)?;
-        let folder = self.folder(&preparations, printer)?;
+        let claim = self.claim(&preparations, printer)?;
         let mut motions = Vec::new();
         let mut skeleton = None;
         for preparation in &preparations {
@@ -171,7 +183,8 @@ impl Args {
             motions.push(motion);
         }
         let skeleton = skeleton.ok_or_else(|| Failure::user("there is no motion to learn"))?;
-        Run::create(folder, preset.plan.clone(), skeleton, motions).map_err(|e| preset.failure(e))
+        let run = claim.create(preset.plan.clone(), skeleton, motions);
+        run.map_err(|e| preset.failure(e))
     }
 
     /// What the inputs are and how they become motions. A motion has its character already; a clip gets that of the preset
@@ -198,18 +211,16 @@ impl Args {
         Ok(files.into_iter().map(prepare).collect())
     }
 
-    /// The folder of the new run: that of `--out`, or a free one named after the inputs.
-    fn folder(&self, preparations: &[Preparation], printer: &Printer) -> Outcome<PathBuf> {
+    /// Claims the folder of the new run: that of `--out`, or a free one named after the inputs.
+    fn claim(&self, preparations: &[Preparation], printer: &Printer) -> Outcome<Claim> {
         if let Some(out) = &self.out {
-            if locate::is_run(out) {
-                return Err(
-                    Failure::input(out, "this folder already holds a run").with_remedy(format!(
-                        "choose another folder with `--out`, or continue that run with `--resume {}`",
-                        out.display()
-                    )),
-                );
-            }
-            return Ok(out.clone());
+            return Claim::on(out).map_err(|error| match error {
+                RunError::Exists(_) => Failure::from(error).with_remedy(format!(
+                    "choose another folder with `--out`, or continue that run with `--resume {}`",
+                    out.display()
+                )),
+                _ => error.into(),
+            });
         }
         let names: Vec<String> = preparations.iter().map(Preparation::name).collect();
         let name = match names.as_slice() {
@@ -217,7 +228,8 @@ impl Args {
             few => few.join("-and-"),
         };
         let name = crate::output::safe_name(&name);
-        let folder = runs::free_folder(&name);
+        let claim = runs::claim(&name)?;
+        let folder = claim.dir();
         if folder
             .file_name()
             .is_some_and(|taken| taken != name.as_str())
@@ -227,7 +239,7 @@ impl Args {
                 folder.display()
             ));
         }
-        Ok(folder)
+        Ok(claim)
     }
 
     /// The settings of the preset, with the changes of the command line.
@@ -253,30 +265,35 @@ impl Args {
     }
 }
 
-/// Trains until the samples or the time are used up, or until Ctrl-C. It saves between rounds only: there a run can be
-/// continued bit for bit.
+/// Trains until the samples or the time are used up, until it is asked to stop, or until nobody reads its lines any more. It
+/// saves between rounds only: there a run can be continued bit for bit.
 fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Outcome<End> {
     let begun = Instant::now();
     let progress = Progress::new(session, printer);
-    let stop = Stop::on_ctrl_c({
+    let stop = Stop::on_signals({
         let (bar, printer, text) = (progress.bar(), *printer, farewell(session.run()));
         move || {
             bar.finish_and_clear();
             printer.say(&text);
         }
     })?;
+    let mut unheard = None;
     let end = loop {
         let iteration = session.iterate();
         let iteration = iteration.map_err(|e| unwritten(session.run(), e))?;
-        progress.show(&iteration, printer)?;
-        if stop.is_wanted() {
+        if unheard.is_none() {
+            // What is learned in this round is saved first, whatever became of standard output.
+            unheard = progress.show(&iteration, printer).err();
+        }
+        let ends = stop.is_wanted() || unheard.is_some();
+        if ends {
             progress.say("finishing this round");
         }
         if !session.can_be_saved() {
             continue;
         }
         session.save().map_err(|e| unwritten(session.run(), e))?;
-        if stop.is_wanted() {
+        if ends {
             break End::Interrupted;
         }
         if session.is_done() {
@@ -286,11 +303,19 @@ fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Ou
             break End::OutOfTime;
         }
     };
-    Ok(if stop.release() {
+    let end = if stop.release() {
         End::Interrupted
     } else {
         end
-    })
+    };
+    match unheard {
+        Some(failure) => {
+            drop(progress);
+            printer.say(farewell(session.run()));
+            Err(failure)
+        }
+        None => Ok(end),
+    }
 }
 
 fn minutes(text: &str) -> Result<f64, String> {

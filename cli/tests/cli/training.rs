@@ -1,5 +1,6 @@
 //! `train`, `eval`, `replay` of a run, `bench`.
 
+mod claims;
 mod stopping;
 
 use crate::workbench::Workbench;
@@ -259,17 +260,22 @@ fn numbers_out_of_range_are_wrong_usage() {
 #[test]
 fn a_run_that_cannot_be_written_is_failed_work() {
     let bench = with_preset();
-    for blocked in ["policy.safetensors", "reference-0.motion"] {
-        std::fs::create_dir_all(bench.path("run").join(blocked)).expect("a folder can be made");
-        let said = bench.complaint(&SMALL, 1);
-        assert!(said.contains(blocked), "{said}");
-        let saving = blocked == "policy.safetensors";
-        assert_eq!(said.contains("train --resume run"), saving, "{said}");
-        std::fs::remove_dir_all(bench.path("run")).expect("a folder can be removed");
-    }
-    std::fs::create_dir_all(bench.path("run/skeleton.xml")).expect("a folder can be made");
-    bench.write("run/config.json", b"{}");
-    bench.complaint(&["eval", "run"], 2);
+    let cut = ["--samples", "2560", "--minutes", "1e-9"];
+    bench.mimic(&[&SMALL[..], &cut].concat()).assert().success();
+    let policy = bench.path("run/policy.safetensors");
+    std::fs::remove_file(&policy).expect("it was saved");
+    std::fs::create_dir(&policy).expect("a folder can be made");
+    let resume = ["train", "--resume", "run"];
+    let said = bench.complaint(&resume, 1);
+    assert!(said.contains("policy.safetensors"), "{said}");
+    assert!(said.contains("train --resume run"), "{said}");
+    std::fs::remove_dir(&policy).expect("it is empty");
+    bench.mimic(&resume).assert().success();
+
+    bench.write("config.json", b"{}");
+    std::fs::create_dir_all(bench.path("other/skeleton.xml")).expect("a folder can be made");
+    std::fs::rename(bench.path("config.json"), bench.path("other/config.json")).expect("moved");
+    bench.complaint(&["eval", "other"], 2);
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub enum Actions {
     /// The output is a rotation that is added to the reference's own joint targets.
     Residual {
         /// Rotation for an output of 1.
-        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "rad"))]
+        #[schemars(range(max = 10.0), extend("exclusiveMinimum" = 0, "x-unit" = "rad"))]
         scale: f32,
     },
     /// The output is the target itself, as an exponential map: 0 is the middle of each coordinate's range. A hinge is aimed at
@@ -23,7 +23,7 @@ pub enum Actions {
     Absolute {
         /// Target for an output of ±1, as a share of the way from the target for 0 to the end of the range; under `from-rest` to
         /// the farther end.
-        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
+        #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0))]
         reach: f32,
     },
     /// The output is the target itself, as an exponential map: 0 is the rest pose. A hinge is aimed at most half a radian
@@ -31,7 +31,7 @@ pub enum Actions {
     FromRest {
         /// Target for an output of ±1, as a share of the way from the target for 0 to the end of the range; under `from-rest` to
         /// the farther end.
-        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0))]
+        #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0))]
         reach: f32,
     },
 }
@@ -69,34 +69,34 @@ pub struct Rewards {
     /// Which errors the terms are made of.
     pub kernels: Kernels,
     /// Weight of the error of the joints' rotations.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub pose: f32,
     /// Weight of the error of the joints' or bodies' angular velocities.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub velocity: f32,
     /// Weight of the error of the bodies' positions relative to the root.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub position: f32,
     /// Weight of the error of the root's position and rotation.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub root: f32,
     /// Weight of the error of the root's linear and angular velocity.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub root_velocity: f32,
     /// Weight of the error of the centre of mass's velocity.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub com: f32,
     /// Weight of the error of the angular momentum about the centre of mass.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub angular_momentum: f32,
     /// Weight of the error of the positions of hands and feet.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub end_effector: f32,
     /// Weight of the error of the velocities of hands and feet.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub end_effector_velocity: f32,
     /// Weight of the error of the centre of mass's position.
-    #[schemars(range(min = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub com_position: f32,
 }
 
@@ -207,7 +207,7 @@ pub struct ImitationSettings {
     /// Time from the start of an episode to its first transition into another motion of the run, and from each to the next: the
     /// least and the most. `null` keeps an episode to one motion.
     #[schemars(
-        inner(range(min = 0.1, max = 1e6)),
+        inner(range(min = 0.1, max = 3600.0)),
         extend("x-ascending" = true, "x-unit" = "s")
     )]
     pub transitions_s: Option<[f64; 2]>,
@@ -215,7 +215,7 @@ pub struct ImitationSettings {
     /// catch up. Otherwise the motion goes its own way, until a shove or a transition moves it.
     pub cycles_follow: bool,
     /// Longest episode in training.
-    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0, "x-unit" = "s"))]
+    #[schemars(range(max = 3600.0), extend("exclusiveMinimum" = 0, "x-unit" = "s"))]
     pub episode_s: f64,
 }
 

@@ -36,13 +36,14 @@ pub fn finish(session: &Session, printer: &Printer) -> Outcome {
     printer.text(&format!("{folder}\n{}{look}", eval::text(&results)))
 }
 
-/// For a run that has used up its samples: does what a session that was killed left out.
+/// For a run that has used up its samples: does what a session that was killed left out, and makes a policy that was lost or
+/// damaged again from the checkpoint.
 pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
     let run = session.run();
     let folder = run.dir().display();
     let is_there = |name: &str| run.dir().join(name).exists();
     let recorded = !recording::AVAILABLE || is_there(files::RECORDING);
-    if is_there(files::EVALUATION) && recorded {
+    if is_there(files::EVALUATION) && recorded && session.has_policy() {
         let (samples, mimic) = (session.trainer().samples(), program());
         return Err(Failure::user(format!(
             "the run `{folder}` is finished: it has learned from all its {samples} samples"
@@ -52,9 +53,9 @@ pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
         )));
     }
     printer.note(format!(
-        "the run `{folder}` has used up its samples; only its evaluation or its recording is missing"
+        "the run `{folder}` has used up its samples; only some of its results are missing"
     ));
-    // A killed session may have written the last checkpoint, but not the policy that belongs to it.
+    // The policy follows from the checkpoint.
     session.save().map_err(|e| unwritten(run, e))?;
     finish(session, printer)
 }

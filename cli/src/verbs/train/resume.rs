@@ -21,16 +21,21 @@ pub fn farewell(run: &Run) -> String {
     )
 }
 
-/// The failure of a run that cannot be written any more, because the disk is full for example: what was saved last is
-/// whole, so the run can be continued.
+/// The failure of a run that cannot be written any more, because the disk is full for example. What was saved last is
+/// whole, so the run can be continued from there.
 pub fn unwritten(run: &Run, error: RunError) -> Failure {
-    let resume = format!(
-        "check its permissions and the free space there, then continue with `{} train --resume {}`",
-        program(),
-        run.dir().display()
-    );
-    match error.is_write() {
-        true => Failure::from(error).with_remedy(resume),
-        false => Failure::from(error),
+    if !error.is_write() {
+        return error.into();
     }
+    let again = match run.is_saved() {
+        true => format!(
+            "continue with `{} train --resume {}`",
+            program(),
+            run.dir().display()
+        ),
+        false => "train again".to_owned(),
+    };
+    Failure::from(error).with_remedy(format!(
+        "check its permissions and the free space there, then {again}"
+    ))
 }

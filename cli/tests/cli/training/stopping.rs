@@ -64,7 +64,7 @@ fn what_is_not_there_cannot_go_on() {
     let said = bench.complaint(&["eval", "sway.txt"], 2);
     assert!(said.contains("a run is a folder"), "{said}");
     std::fs::write(bench.path("run"), b"").expect("a file can be written");
-    bench.complaint(&SMALL, 1);
+    bench.complaint(&SMALL, 2);
 }
 
 #[cfg(unix)]
@@ -115,8 +115,12 @@ mod signals {
     }
 
     fn interrupt(running: &Running) {
+        signal(running, "-INT");
+    }
+
+    fn signal(running: &Running, signal: &str) {
         let id = running.0.id().to_string();
-        let kill = Command::new("kill").args(["-INT", &id]).status();
+        let kill = Command::new("kill").args([signal, &id]).status();
         assert!(kill.is_ok_and(|status| status.success()));
     }
 
@@ -158,14 +162,21 @@ mod signals {
         assert_eq!(metrics(bench, "run"), unbroken, "{what}");
     }
 
+    /// Ctrl-C, a system that shuts down, a terminal that closes.
     #[test]
-    fn ctrl_c_saves_and_stops() {
+    fn signals_save_and_stop() {
+        for name in ["-INT", "-TERM", "-HUP"] {
+            stops_at(name);
+        }
+    }
+
+    fn stops_at(name: &str) {
         let bench = bench();
         let mut running = start(&bench, &SMALL);
         let logged = || logged_iterations(&bench);
         // In the middle of a round, so that it has something to finish.
         wait_until(|| logged() > ROUND && logged() % ROUND == 2);
-        interrupt(&running);
+        signal(&running, name);
         let status = running.0.wait().expect("the program ends");
         assert!(status.success());
         let said = talk(&mut running);
@@ -179,7 +190,51 @@ mod signals {
             .mimic(&["train", "--resume", "run"])
             .assert()
             .success();
-        assert_same_as_unbroken(&bench, "stopped by Ctrl-C");
+        assert_same_as_unbroken(&bench, &format!("stopped by {name}"));
+    }
+
+    #[test]
+    fn nohup_outlives_its_terminal() {
+        let bench = bench();
+        let mut command = Command::new("nohup");
+        command
+            .arg(assert_cmd::cargo::cargo_bin("mimic"))
+            .args(SMALL)
+            .current_dir(bench.path("."))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        let mut running = Running(command.spawn().expect("the program starts"));
+        wait_until(|| logged_iterations(&bench) > ROUND);
+        signal(&running, "-HUP");
+        assert!(running.0.wait().is_ok_and(|status| status.success()));
+        assert_eq!(logged_iterations(&bench), ITERATIONS as u64);
+    }
+
+    /// As with `--json | head -1`.
+    #[test]
+    fn a_reader_that_goes_away_costs_nothing_that_was_learned() {
+        let bench = bench();
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin("mimic"));
+        command
+            .args(SMALL)
+            .arg("--json")
+            .current_dir(bench.path("."))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut running = Running(command.spawn().expect("the program starts"));
+        drop(running.0.stdout.take());
+        let status = running.0.wait().expect("the program ends");
+        assert!(status.success(), "{status}");
+        let said = talk(&mut running);
+        assert!(said.contains("train --resume run"), "{said}");
+        let logged = logged_iterations(&bench);
+        assert!(logged > 0 && logged.is_multiple_of(ROUND), "{logged}");
+        assert_eq!(saved_iteration(&bench), Some(logged));
+        bench
+            .mimic(&["train", "--resume", "run"])
+            .assert()
+            .success();
+        assert_same_as_unbroken(&bench, "left by its reader");
     }
 
     #[test]

@@ -1,0 +1,229 @@
+//! The folder of a new run: claimed before anything is prepared, so that no other process makes its run there.
+
+use super::error::RunError;
+use super::files;
+use super::folder::{Run, RunConfig, check};
+use super::plan::Plan;
+use crate::file::{LOCK, Lock, is_temporary};
+use crate::motion::Motion;
+use crate::skeleton::Skeleton;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A folder that is empty, and held by this process until a run is made in it. A claim that is dropped leaves nothing.
+#[derive(Debug)]
+pub struct Claim {
+    dir: PathBuf,
+    /// The folders that were made for it, the innermost first.
+    made: Vec<PathBuf>,
+    /// `None` once a run has taken it over.
+    lock: Option<Lock>,
+}
+
+impl Claim {
+    /// Claims the folder `dir`. It is made if there is none.
+    ///
+    /// # Errors
+    /// A folder that isn't empty, that another process holds, or that can't be written.
+    pub fn on(dir: impl AsRef<Path>) -> Result<Self, RunError> {
+        let dir = dir.as_ref();
+        let made = make(dir)?;
+        // Nothing is put into a folder with files, and only the lock makes sure that no other process puts something there.
+        check_empty(dir)?;
+        let claim = Self {
+            dir: dir.to_owned(),
+            made,
+            lock: Some(Lock::take(dir).map_err(|e| RunError::locked(dir, e))?),
+        };
+        match check_empty(dir) {
+            Ok(()) => Ok(claim),
+            Err(error) => {
+                claim.give_up();
+                Err(error)
+            }
+        }
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Makes a run in the folder.
+    ///
+    /// # Errors
+    /// A plan, a character or motions that can't be trained, or a folder that can't be written. Nothing is left of it then.
+    pub fn create(
+        mut self,
+        plan: Plan,
+        skeleton: Skeleton,
+        motions: Vec<Motion>,
+    ) -> Result<Run, RunError> {
+        check(&plan, &skeleton, &motions)?;
+        let write = |name: &str, text: &str| super::folder::write(&self.dir.join(name), text);
+        write(files::SKELETON, &skeleton.mjcf)?;
+        write(files::SLOTS, &skeleton.slots_json())?;
+        for (i, motion) in motions.iter().enumerate() {
+            motion.save(self.dir.join(files::reference(i)))?;
+        }
+        // Last, because this is what makes the folder a run.
+        let config = RunConfig::new(&skeleton.name, motions.len(), plan);
+        write(files::CONFIG, &config.text(&self.dir)?)?;
+        // Files hold single precision: only what is read back from them is learned, so that a resumed run sees the same.
+        let mut run = Run::open(&self.dir)?;
+        run.lock = self.lock.take();
+        Ok(run)
+    }
+
+    /// Ends the claim on a folder that turned out to belong to somebody else.
+    fn give_up(mut self) {
+        self.lock = None;
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        if let Some(lock) = self.lock.take() {
+            clear(&self.dir, lock, &self.made);
+        }
+    }
+}
+
+impl Run {
+    /// Makes a run in the folder `dir`, which is empty or doesn't exist yet. A plan that can't be trained leaves no folder.
+    ///
+    /// # Errors
+    /// As [`Claim::on`] and [`Claim::create`].
+    pub fn create(
+        dir: impl AsRef<Path>,
+        plan: Plan,
+        skeleton: Skeleton,
+        motions: Vec<Motion>,
+    ) -> Result<Self, RunError> {
+        Claim::on(dir)?.create(plan, skeleton, motions)
+    }
+
+    /// Removes the run in `dir` if it never was saved: there is nothing in it to go on from. A run with a checkpoint stays,
+    /// and so does one that another process trains.
+    pub fn discard(dir: impl AsRef<Path>) {
+        let dir = dir.as_ref();
+        let is_there = |name| dir.join(name).exists();
+        let unsaved = || is_there(files::CONFIG) && !is_there(files::CHECKPOINT);
+        if !unsaved() {
+            return;
+        }
+        // Only under the lock is it sure that nobody saves.
+        if let Some(lock) = Lock::take(dir).ok().filter(|_| unsaved()) {
+            clear(dir, lock, &[dir.to_owned()]);
+        }
+    }
+}
+
+/// Makes the folder and those around it. Returns those that weren't there, the innermost first.
+fn make(dir: &Path) -> Result<Vec<PathBuf>, RunError> {
+    let missing = dir
+        .ancestors()
+        .take_while(|path| !path.as_os_str().is_empty() && !path.is_dir());
+    let made = missing.map(Path::to_owned).collect();
+    match fs::create_dir_all(dir) {
+        Ok(()) => Ok(made),
+        Err(e) => Err(unmade(dir, e)),
+    }
+}
+
+fn unmade(dir: &Path, source: io::Error) -> RunError {
+    match source.kind() {
+        // Some part of the path is a file.
+        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
+            RunError::NoFolder(dir.to_owned())
+        }
+        _ => RunError::Write {
+            path: dir.to_owned(),
+            source,
+        },
+    }
+}
+
+fn check_empty(dir: &Path) -> Result<(), RunError> {
+    let entries = fs::read_dir(dir).map_err(|source| RunError::Read {
+        path: dir.to_owned(),
+        source,
+    })?;
+    let others = entries.flatten().any(|entry| {
+        entry.file_name() != LOCK && !is_temporary(&entry.file_name().to_string_lossy())
+    });
+    match others {
+        false => Ok(()),
+        true if dir.join(files::CONFIG).exists() => Err(RunError::Exists(dir.to_owned())),
+        true => Err(RunError::NotEmpty(dir.to_owned())),
+    }
+}
+
+/// Removes what a run wrote into the folder, and then the folders that were `made`. Files of others stay, and so do folders
+/// with something in them.
+fn clear(dir: &Path, lock: Lock, made: &[PathBuf]) {
+    // What can't be removed stays; the error that led here is told, and says more.
+    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+        if files::is_own(&entry.file_name()) {
+            fs::remove_file(entry.path()).ok();
+        }
+    }
+    drop(lock);
+    for folder in made {
+        fs::remove_dir(folder).ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_claim_that_is_dropped_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("runs/kick");
+        let claim = Claim::on(&path).expect("it is free");
+        assert!(matches!(Claim::on(&path), Err(RunError::Held { .. })));
+        drop(claim);
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 0);
+        // A folder that was there stays.
+        fs::create_dir_all(&path).expect("a folder");
+        drop(Claim::on(&path).expect("it is empty"));
+        assert_eq!(fs::read_dir(&path).expect("listed").count(), 0);
+    }
+
+    #[test]
+    fn what_is_in_a_folder_stays_as_it_is() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("eval.json"), "mine").expect("written");
+        assert!(matches!(
+            Claim::on(folder.path()),
+            Err(RunError::NotEmpty(_))
+        ));
+        let file = folder.path().join("eval.json");
+        for dir in [file.clone(), file.join("run")] {
+            assert!(matches!(Claim::on(dir), Err(RunError::NoFolder(_))));
+        }
+        Run::discard(folder.path().join("missing"));
+        assert_eq!(fs::read_to_string(&file).expect("read"), "mine");
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn one_of_many_gets_a_folder() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run");
+        let start = std::sync::Barrier::new(8);
+        let claim = || {
+            start.wait();
+            Claim::on(&path).ok()
+        };
+        let claims: Vec<Option<Claim>> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..8).map(|_| scope.spawn(claim)).collect();
+            let joined = threads.into_iter().map(|thread| thread.join());
+            joined.map(|claim| claim.expect("no panic")).collect()
+        });
+        assert_eq!(claims.iter().flatten().count(), 1);
+    }
+}
