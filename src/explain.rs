@@ -76,12 +76,26 @@ pub enum Parameter {
 /// Most characters that a part keeps of its start, and as many of its end.
 const KEPT: usize = 300;
 
-/// A text on one line of bearable length. Names that a file holds find their way into messages: control characters in
-/// them could write to a terminal, and nobody reads a name of a megabyte. A long text loses its middle, because the start
-/// says what is wrong and the end often where.
-pub(crate) fn one_line(text: &str) -> String {
-    let plain = |c: char| if c.is_control() { ' ' } else { c };
-    let letters: Vec<char> = text.trim().chars().map(plain).collect();
+/// Whether a character is shown as nothing but itself: no control character, which could write to a terminal or end a
+/// line, and none that turns the direction of what follows or hides in it, which could make a name look like another.
+pub fn is_plain(c: char) -> bool {
+    !c.is_control()
+        && !matches!(c,
+            // Marks, embeddings and isolates of directions; ends of lines and paragraphs; the mark of the byte order; tags.
+            '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}'
+            | '\u{feff}' | '\u{e0000}'..='\u{e007f}')
+}
+
+/// A text on one line, whatever it is made of: what isn't [plain](is_plain) becomes a blank.
+pub fn plain(text: &str) -> String {
+    let shown = |c: char| if is_plain(c) { c } else { ' ' };
+    text.chars().map(shown).collect()
+}
+
+/// A text on one line of bearable length. Names that a file holds find their way into messages, and nobody reads a name of
+/// a megabyte. A long text loses its middle, because the start says what is wrong and the end often where.
+pub fn one_line(text: &str) -> String {
+    let letters: Vec<char> = plain(text.trim()).chars().collect();
     if letters.len() <= 2 * KEPT {
         return letters.into_iter().collect();
     }
@@ -147,7 +161,7 @@ impl Explanation {
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         if let Some(file) = &self.file {
-            write!(f, "`{}`: ", file.display())?;
+            write!(f, "`{}`: ", plain(&file.display().to_string()))?;
         }
         if let Some(place) = &self.place {
             write!(f, "{place}: ")?;
@@ -189,6 +203,18 @@ mod tests {
             whole.to_string(),
             "`kick.fbx`: take `Kick`: it is empty; choose another take"
         );
+    }
+
+    #[test]
+    fn names_can_not_turn_or_hide_what_is_shown() {
+        let name = "a\u{202e}b\u{9b}31m\u{2028}c\u{7f}\0d\u{200f}e\u{e0041}";
+        assert_eq!(plain(name), "a b 31m c  d e ");
+        // Names in other scripts stay as they are, with joiners and combining marks.
+        for name in ["قوس", "क्\u{200d}ष", "می\u{200c}شود", "e\u{301}", "⚽"] {
+            assert_eq!(plain(name), name);
+        }
+        let file = Explanation::input("it is empty").file("a\n\u{1b}b.fbx");
+        assert_eq!(file.to_string(), "`a  b.fbx`: it is empty");
     }
 
     #[test]

@@ -23,6 +23,14 @@ pub struct Talk {
     pub verbose: bool,
 }
 
+/// Whether a result may take the place of something else.
+#[derive(Args, Clone, Copy, Default)]
+pub struct Replace {
+    /// Replace a file that the same command did not make from the same input
+    #[arg(long)]
+    pub force: bool,
+}
+
 /// How an animation file is read.
 #[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Import options")]
@@ -31,10 +39,10 @@ pub struct ImportArgs {
     #[arg(long, value_name = "TAKE")]
     take: Option<String>,
     /// Frames per second to sample at; below 27, a motion is sampled at a multiple of it [default: the take's own rate]
-    #[arg(long, value_name = "HZ", value_parser = positive)]
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Part of the take to keep, in seconds from its start, e.g. 0.5..2, 1.. or ..2
-    #[arg(long, value_name = "A..B", value_parser = span)]
+    #[arg(long, value_name = "A..B", value_parser = span, allow_hyphen_values = true)]
     trim: Option<(f64, f64)>,
     /// Whether the motion repeats: `auto` (decide by the motion), `wrap` (it does) or `clamp` (it plays once)
     #[arg(
@@ -49,7 +57,7 @@ pub struct ImportArgs {
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     up: Option<UpAxis>,
     /// Metres per unit of length, if the file states a wrong unit; 0.01 for centimetres
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = positive, allow_negative_numbers = true)]
     unit: Option<f64>,
 }
 
@@ -157,10 +165,55 @@ fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
 
 /// A whole number from 1.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match whole(text)? {
+        0 => Err("must be at least 1".into()),
+        number => usize::try_from(number).map_err(|_| "too large".into()),
+    }
+}
+
+/// A whole number from 0.
+pub fn whole(text: &str) -> Result<u64, String> {
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    let is_whole = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
     match text.parse() {
-        Ok(0) => Err("must be at least 1".into()),
         Ok(number) => Ok(number),
-        Err(_) => Err("not a whole number".into()),
+        Err(_) if !is_whole => Err("not a whole number".into()),
+        Err(_) if text.starts_with('-') => Err("must not be negative".into()),
+        Err(_) => Err(format!("must be at most {}", u64::MAX)),
+    }
+}
+
+/// Most samples that a training can be told to learn from. Chosen: at ten thousand a second they take three thousand years.
+const MOST_SAMPLES: f64 = 1e15;
+
+/// A number of samples, with k for thousands and M for millions.
+pub fn samples(text: &str) -> Result<u64, String> {
+    let wrong = || "give a whole number, with k for thousands or M for millions, e.g. 800k or 2.5M";
+    let (number, factor) = match text.strip_suffix(['k', 'K']) {
+        Some(number) => (number, 1e3),
+        None => match text.strip_suffix(['m', 'M']) {
+            Some(number) => (number, 1e6),
+            None => (text, 1.0),
+        },
+    };
+    // Rust would take "inf" and "nan" for numbers as well.
+    let digits = number.trim_start_matches(['+', '-']);
+    let is_number = digits.starts_with(|c: char| c == '.' || c.is_ascii_digit());
+    let value: f64 = number
+        .parse()
+        .ok()
+        .filter(|_| is_number)
+        .ok_or_else(wrong)?;
+    // Of 0.0011M, which is 1100, the product may be off by a rounding.
+    let (value, exact) = ((value * factor).round(), value * factor);
+    if exact < 1.0 {
+        Err("must be at least 1".into())
+    } else if value > MOST_SAMPLES {
+        Err("must be at most 1e15".into())
+    } else if (value - exact).abs() > 1e-9 * exact {
+        Err(format!("{text} is not a whole number of samples"))
+    } else {
+        Ok(value as u64)
     }
 }
 
@@ -186,6 +239,57 @@ pub fn span(text: &str) -> Result<(f64, f64), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn samples_have_units_and_are_whole() {
+        for (text, number) in [
+            ("4096", 4096),
+            ("800k", 800_000),
+            ("2.5M", 2_500_000),
+            ("1e6", 1_000_000),
+            ("0.0011M", 1100),
+            ("1e15", 1_000_000_000_000_000),
+        ] {
+            assert_eq!(samples(text), Ok(number), "{text}");
+        }
+        for (text, reason) in [
+            ("0", "at least 1"),
+            ("-5", "at least 1"),
+            ("0.5", "at least 1"),
+            ("1e30", "at most"),
+            ("1e999", "at most"),
+            ("1.5", "not a whole number"),
+            ("0.0015k", "not a whole number"),
+            ("5kM", "e.g. 800k"),
+            ("M", "e.g. 800k"),
+            ("", "e.g. 800k"),
+            ("nan", "e.g. 800k"),
+            ("inf", "e.g. 800k"),
+            ("-inf", "e.g. 800k"),
+            ("-nan", "e.g. 800k"),
+            ("many", "e.g. 800k"),
+        ] {
+            let said = samples(text).expect_err(text);
+            assert!(said.contains(reason), "{text}: {said}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_say_what_is_wrong_with_others() {
+        assert_eq!(whole("18446744073709551615"), Ok(u64::MAX));
+        for (text, reason) in [
+            ("-1", "must not be negative"),
+            ("18446744073709551616", "must be at most"),
+            ("1.5", "not a whole number"),
+            ("", "not a whole number"),
+            ("-", "not a whole number"),
+            ("x", "not a whole number"),
+        ] {
+            let said = whole(text).expect_err(text);
+            assert!(said.contains(reason), "{text}: {said}");
+        }
+        assert_eq!(at_least_one("0"), Err("must be at least 1".to_owned()));
+    }
 
     #[test]
     fn spans_may_be_open() {

@@ -4,7 +4,9 @@ use crate::args::Talk;
 use crate::failure::Failure;
 use crate::printer;
 use crate::verbs::Verb;
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{Command, CommandFactory, Parser};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -47,57 +49,106 @@ pub struct Cli {
 /// Reads the command line. Help and the version are printed and end the program well; a wrong line ends it with 2.
 pub fn parse() -> Result<Cli, ExitCode> {
     Cli::try_parse().map_err(|error| {
-        // If even this cannot be printed, nobody is left to tell.
-        error.print().ok();
-        if !error.use_stderr() {
-            return ExitCode::SUCCESS;
+        if !error.use_stderr()
+            || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+        {
+            // If even this cannot be printed, nobody is left to tell.
+            error.print().ok();
+            return (error.exit_code() as u8).into();
         }
-        let failure = usage(&error.render().to_string());
+        let arguments: Vec<_> = std::env::args_os().collect();
+        let failure = usage(&error.render().to_string(), &arguments);
+        printer::usage_error(&failure);
         // The flags could not be read, so `--json` is looked for by itself.
-        if std::env::args_os().any(|argument| argument == "--json") {
+        if arguments.iter().any(|argument| argument == "--json") {
             printer::json_error(&failure);
         }
         failure.code().into()
     })
 }
 
-/// What is wrong with a command line, from what clap says about it: the cause in the first paragraph, then its tips.
-fn usage(said: &str) -> Failure {
+/// What is wrong with a command line, from what clap says about it: the cause in the first paragraph, then its tips. One of
+/// its tips is always about a `--` that makes a wrong flag a file, which nobody means.
+fn usage(said: &str, arguments: &[OsString]) -> Failure {
     let cause = said.split("\n\n").next().unwrap_or(said);
+    let cause = cause.strip_prefix("error: ").unwrap_or(cause);
+    let words: Vec<&str> = cause.split_whitespace().collect();
     let tips: Vec<&str> = said
         .lines()
         .filter_map(|line| line.trim().strip_prefix("tip: "))
+        .filter(|tip| !tip.starts_with("to pass "))
         .collect();
     let remedy = match tips.is_empty() {
-        true => "see `mimic --help`".to_owned(),
+        true => format!("see `{} --help`", named_verb(arguments)),
         false => tips.join("; "),
     };
-    Failure::user(cause.trim_start_matches("error: ")).with_remedy(remedy)
+    Failure::user(words.join(" ")).with_remedy(remedy)
+}
+
+/// `mimic VERB` for the first argument that is a verb, else `mimic`.
+fn named_verb(arguments: &[OsString]) -> String {
+    let command = Cli::command();
+    let verbs: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
+    let mut words = arguments.iter().filter_map(|argument| argument.to_str());
+    match words.find(|word| verbs.contains(word)) {
+        Some(verb) => format!("mimic {verb}"),
+        None => "mimic".to_owned(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
     }
 
+    fn failure(line: &[&str]) -> Failure {
+        let said = Cli::try_parse_from(line).err();
+        let said = said.map(|e| e.render().to_string()).expect("it is wrong");
+        usage(&said, &line.iter().map(OsString::from).collect::<Vec<_>>())
+    }
+
     #[test]
     fn wrong_usage_has_its_parts() {
-        let line = ["mimic", "info", "kick.fbx", "--jsno"];
-        let said = Cli::try_parse_from(line)
-            .err()
-            .map(|e| e.render().to_string());
-        let failure = usage(&said.expect("there is no such flag"));
+        let failure = failure(&["mimic", "info", "kick.fbx", "--jsno"]);
         assert_eq!(failure.code(), 2);
         let json = failure.json();
         assert_eq!(json["remedy"], "a similar argument exists: '--json'");
         let message = json["message"].as_str().unwrap_or_default();
         assert!(
             message.starts_with("unexpected argument '--jsno' found; "),
+            "{message}"
+        );
+    }
+
+    /// Where clap has no better advice than to take the flag for a file, the help of the verb is.
+    #[test]
+    fn what_nothing_resembles_leads_to_the_help_of_the_verb() {
+        for (line, help) in [
+            (
+                &["mimic", "info", "a.fbx", "--zzz"][..],
+                "see `mimic info --help`",
+            ),
+            (
+                &["mimic", "eval", "--episodes", "0"],
+                "see `mimic eval --help`",
+            ),
+            (&["mimic", "--zzz"], "see `mimic --help`"),
+        ] {
+            assert_eq!(failure(line).json()["remedy"], help, "{line:?}");
+        }
+        let message = failure(&["mimic", "import"]).message().unwrap_or_default();
+        assert!(
+            message.contains("not provided: <FILE>...; see"),
+            "{message}"
+        );
+        let message = failure(&["mimic", "train", "--seed", "-1"]).message();
+        let message = message.unwrap_or_default();
+        assert!(
+            message.contains("'-1'") && message.contains("--seed"),
             "{message}"
         );
     }

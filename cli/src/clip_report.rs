@@ -1,6 +1,7 @@
 //! What `import` and `edit` report of a clip that they wrote.
 
 use mimic::clip::{Clip, LoopMode, Problem};
+use mimic::explain::plain;
 use serde::Serialize;
 use std::path::Path;
 
@@ -50,8 +51,8 @@ impl ClipReport {
             joints,
             ..
         } = self;
-        format!(
+        plain(&format!(
             "{clip}: {frames} frames at {fps:.1} Hz, {duration_s:.2} s, {joints} joints, {loops}"
-        )
+        ))
     }
 }

@@ -3,7 +3,7 @@
 //! The library's errors come with their parts ([`Explain`]): which file, where in it, what is wrong and what to do. All that
 //! is added here is the name of the flag to change. Exit code 2 is for what the user can mend, 1 for work that failed.
 
-use mimic::explain::{Explain, Explanation, Fault, Parameter, Remedy};
+use mimic::explain::{Explain, Explanation, Fault, Parameter, Remedy, plain};
 use mimic::file::unread;
 use serde_json::{Value, json};
 use std::error::Error;
@@ -97,23 +97,22 @@ impl Failure {
 
     /// Says where in the file.
     #[must_use]
-    pub fn with_place(mut self, place: impl Display) -> Self {
-        if let Self::Failed(parts) | Self::Partly(parts) = &mut self {
-            parts.place = Some(place.to_string());
-        }
-        self
+    pub fn with_place(self, place: impl Display) -> Self {
+        self.map(|parts| parts.place(place.to_string()))
     }
 
     /// Says what to do about it; `advice` begins with a verb.
     #[must_use]
-    pub fn with_remedy(mut self, advice: impl Display) -> Self {
-        if let Self::Failed(parts) | Self::Partly(parts) = &mut self {
-            parts.remedy = Some(Remedy {
-                advice: advice.to_string(),
-                parameter: None,
-            });
+    pub fn with_remedy(self, advice: impl Display) -> Self {
+        self.map(|parts| parts.remedy(advice.to_string()))
+    }
+
+    fn map(self, change: impl FnOnce(Explanation) -> Explanation) -> Self {
+        match self {
+            Self::Failed(parts) => Self::Failed(Box::new(change(*parts))),
+            Self::Partly(parts) => Self::Partly(Box::new(change(*parts))),
+            Self::ClosedPipe => Self::ClosedPipe,
         }
-        self
     }
 
     /// The failure of a command whose result has been printed.
@@ -141,7 +140,7 @@ impl Failure {
             advice,
             parameter: None,
         });
-        Some(one_line(&parts.to_string()))
+        Some(plain(&parts.to_string()))
     }
 
     /// The parts of the message for scripts.
@@ -151,9 +150,10 @@ impl Failure {
         };
         json!({
             "message": self.message(),
-            "file": parts.file,
-            "place": parts.place.as_deref().map(one_line),
-            "remedy": remedy(parts).as_deref().map(one_line),
+            // A path need not be Unicode, which JSON has to be.
+            "file": parts.file.as_ref().map(|file| file.display().to_string()),
+            "place": parts.place,
+            "remedy": remedy(parts),
             "exit": self.code(),
         })
     }
@@ -181,14 +181,6 @@ fn remedy(parts: &Explanation) -> Option<String> {
     })
 }
 
-/// A path may hold line breaks and control characters, and clap breaks lines. A message stays on one line, and harmless to
-/// a terminal.
-fn one_line(text: &str) -> String {
-    let words: Vec<_> = text.split_whitespace().collect();
-    let line = words.join(" ");
-    line.chars().filter(|c| !c.is_control()).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,7 +190,7 @@ mod tests {
         let failure = Failure::input(Path::new("a/kick.fbx"), "truncated\n  at byte 3\x1b[2J");
         assert_eq!(
             failure.message().as_deref(),
-            Some("`a/kick.fbx`: truncated at byte 3 [2J")
+            Some("`a/kick.fbx`: truncated   at byte 3 [2J")
         );
     }
 

@@ -1,9 +1,10 @@
 //! The only file that prints: results on standard output, everything else on standard error.
 
 use crate::args::Talk;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, Outcome, flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mimic::clip::{Problem, Severity};
+use mimic::explain::{is_plain, plain};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::io::{IsTerminal, Write, stderr, stdout};
@@ -67,11 +68,17 @@ impl Printer {
     pub fn json_line(&self, json: &impl Serialize) -> Outcome {
         let line = serde_json::to_string(json)
             .map_err(|e| Failure::work(format!("cannot write the result as JSON: {e}")))?;
-        self.text(&line)
+        self.text(&escaped(&line))
     }
 
-    /// Text on standard output, ended by a line break.
+    /// Text on standard output, ended by a line break. Whatever it holds, it only shows letters.
     pub fn text(&self, text: &str) -> Outcome {
+        let shown = |c: char| match c {
+            '\n' | '\t' => c,
+            c if is_plain(c) => c,
+            _ => ' ',
+        };
+        let text: String = text.chars().map(shown).collect();
         let mut out = stdout().lock();
         let end: &[u8] = if text.ends_with('\n') { b"" } else { b"\n" };
         out.write_all(text.as_bytes())
@@ -83,39 +90,37 @@ impl Printer {
     /// Says what is going on, to people at a terminal and with `--verbose`.
     pub fn note(&self, text: impl AsRef<str>) {
         if !self.quiet && (self.heard || self.verbose) {
-            self.talk(text.as_ref());
+            self.talk("", text.as_ref());
         }
     }
 
     /// Says what has to be known even where standard error goes to a file.
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.quiet {
-            self.talk(text.as_ref());
+            self.talk("", text.as_ref());
         }
     }
 
     /// Says what only `--verbose` asks for.
     pub fn detail(&self, text: impl AsRef<str>) {
         if self.verbose && !self.quiet {
-            self.talk(text.as_ref());
+            self.talk("", text.as_ref());
         }
     }
 
     /// Says what may be wrong with the result.
     pub fn warn(&self, text: impl AsRef<str>) {
         if !self.quiet {
-            self.talk(&format!(
-                "{} {}",
-                self.paint("warning:", "33"),
-                text.as_ref()
-            ));
+            self.talk(&self.paint("warning:", "33"), text.as_ref());
         }
     }
 
     /// Says what was found in a file: warnings and errors always, notes with `--verbose`.
     pub fn problems(&self, problems: &[Problem]) {
         for problem in problems {
-            let line = format!("{} [{}]", problem.message, problem.id);
+            let flag = problem.parameter().and_then(flag);
+            let flag = flag.map_or_else(String::new, |flag| format!(" (`{flag}`)"));
+            let line = format!("{}{flag} [{}]", problem.message, problem.id);
             match problem.severity {
                 Severity::Note => self.detail(format!("note: {line}")),
                 Severity::Warning | Severity::Error => self.warn(line),
@@ -157,13 +162,13 @@ impl Printer {
 
     /// Says what went wrong, even with `--quiet`.
     pub fn error(&self, text: impl AsRef<str>) {
-        let label = self.paint("error:", "31;1");
-        self.talk(&format!("{label} {}", text.as_ref()));
+        self.talk(&self.paint("error:", "31;1"), text.as_ref());
     }
 
-    /// A closed standard error is no reason to stop working.
-    fn talk(&self, line: &str) {
-        writeln!(stderr().lock(), "{line}").ok();
+    /// A line on standard error, with a label of our own before it. A closed standard error is no reason to stop working.
+    fn talk(&self, label: &str, line: &str) {
+        let gap = if label.is_empty() { "" } else { " " };
+        writeln!(stderr().lock(), "{label}{gap}{}", plain(line)).ok();
     }
 
     fn paint(&self, text: &str, code: &str) -> String {
@@ -175,15 +180,50 @@ impl Printer {
     }
 }
 
+/// An error of the command line itself, before its flags are known.
+pub fn usage_error(failure: &Failure) {
+    let talk = Talk {
+        json: false,
+        quiet: false,
+        verbose: false,
+    };
+    Printer::new(&talk).error(failure.message().unwrap_or_default());
+}
+
 /// The error as a JSON object on standard output.
 pub fn json_error(failure: &Failure) {
     // A reader that went away doesn't change what happened.
-    writeln!(stdout(), "{}", json!({ "error": failure.json() })).ok();
+    let line = json!({ "error": failure.json() }).to_string();
+    writeln!(stdout(), "{}", escaped(&line)).ok();
+}
+
+/// JSON in which everything that isn't plain is escaped. It stands in strings alone, and they mean the same.
+fn escaped(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for c in json.chars() {
+        if is_plain(c) {
+            text.push(c);
+        } else {
+            for unit in c.encode_utf16(&mut [0; 2]) {
+                text += &format!("\\u{unit:04x}");
+            }
+        }
+    }
+    text
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn json_shows_no_control_characters_and_means_the_same() {
+        let name = "a\u{9b}31m\u{7f}\u{202e}\u{e0041}\n\"ö";
+        let line = escaped(&json!({ "name": name }).to_string());
+        assert!(line.chars().all(is_plain), "{line}");
+        let read: Value = serde_json::from_str(&line).expect("it is JSON");
+        assert_eq!(read["name"], name);
+    }
 
     #[test]
     fn progress_is_for_who_watches_standard_error() {

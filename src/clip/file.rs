@@ -49,6 +49,15 @@ impl Clip {
         Ok(self.writer().save(path.as_ref(), FORMAT, &self.header())?)
     }
 
+    /// The bytes of a clip file. It keeps the text `made`, which [`made_by`](crate::file::made_by) reads.
+    ///
+    /// # Errors
+    /// [`Error::File`] when the clip has frames of another number of joints.
+    pub fn to_bytes(&self, made: Option<&str>) -> Result<Vec<u8>, Error> {
+        let bytes = self.writer().to_bytes(FORMAT, &self.header(), made);
+        Ok(bytes.map_err(|flaw| flaw.of(self.name.as_ref(), FORMAT))?)
+    }
+
     /// Reads the clip file `path`.
     ///
     /// # Errors

@@ -104,7 +104,7 @@ impl Explain for FileError {
         let told = match &self.flaw {
             Flaw::Read(source) => unread(source),
             Flaw::Write(source) => Explanation::work(format!("cannot be written ({source})"))
-                .remedy("check the path, its permissions and the free space"),
+                .remedy("check the path, its permissions and the free space on the disk"),
             Flaw::TooLarge { most } => Explanation::input(format!(
                 "this {name} is too large for a file: it would need more than {most} bytes, the most that can be read again"
             ))

@@ -7,25 +7,26 @@
 mod error;
 mod format;
 mod lock;
+mod made;
 mod read;
 mod tensors;
+mod unfinished;
 
 pub use error::{FileError, Flaw};
 pub use format::Format;
 pub use lock::{Holder, LOCK, Lock, LockError};
+pub use made::{holds, made_by};
 pub use read::{read_at_most, text_at_most, unread};
 pub(crate) use tensors::{Reader, Writer, format_of, load};
+pub use unfinished::Unfinished;
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// What the names of temporary files begin with.
-const TEMPORARY: &str = ".mimic-";
-
 /// Whether a file of this name is one that is being written, or was left by a process that was killed meanwhile.
 pub fn is_temporary(name: &str) -> bool {
-    name.starts_with(TEMPORARY)
+    name.starts_with(unfinished::PREFIX)
 }
 
 /// Replaces the content of the file `path` by `bytes`, at once: they are written to a temporary file beside it, flushed to
@@ -39,29 +40,9 @@ pub fn replace(path: impl AsRef<Path>, bytes: &[u8]) -> io::Result<()> {
 
 /// Replaces the content of the file `path` by what `write` writes.
 fn replace_by(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
-    let folder = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY);
-    // Temporary files are private by default; this one becomes a file like any other.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(unnamed)?;
-    write(file.as_file_mut())?;
-    file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
-}
-
-/// The error without the name of the temporary file, which the caller never chose. `tempfile` wraps the system's error in
-/// one of its own to add the name, and keeps its kind.
-fn unnamed(error: io::Error) -> io::Error {
-    match error.get_ref() {
-        Some(_) => error.kind().into(),
-        None => error,
-    }
+    let mut file = Unfinished::beside(path)?;
+    write(file.file())?;
+    file.replace()
 }
 
 #[cfg(test)]

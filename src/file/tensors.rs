@@ -2,6 +2,7 @@
 //! fields `format` and `version`, and then those of the format.
 
 use super::format::Stamp;
+use super::made::Made;
 use super::{FileError, Flaw, Format, read_at_most};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
 use serde::de::DeserializeOwned;
@@ -10,10 +11,10 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// The key of the metadata under which our JSON object stands.
-const KEY: &str = "mimic";
+pub(super) const KEY: &str = "mimic";
 /// Most bytes that are written to a file, and read of one. Chosen: the largest clip, 20 million transforms of seven `f32`,
 /// has an eighth of that, and a path that is a mistake doesn't fill the memory.
-const MOST_BYTES: u64 = 4 << 30;
+pub(super) const MOST_BYTES: u64 = 4 << 30;
 /// Most bytes that a header has: `MAX_HEADER_SIZE` of the `safetensors` crate, which refuses longer ones.
 const MOST_HEADER_BYTES: u64 = 100_000_000;
 /// Bytes at the beginning of a file that say how long its header is.
@@ -51,6 +52,8 @@ element!(u64, U64);
 struct Stamped<'a, H> {
     format: &'a str,
     version: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    made: Option<Made>,
     #[serde(flatten)]
     fields: &'a H,
 }
@@ -76,15 +79,35 @@ impl Writer {
             .push((name.into(), E::DTYPE, shape.to_vec(), bytes));
     }
 
-    /// The bytes of the file, with `fields` as its metadata.
+    /// The bytes of the file, with `fields` as its metadata, and what it was `made` by if that is to be known.
     pub(crate) fn to_bytes(
         &self,
         format: Format,
         fields: &impl Serialize,
+        made: Option<&str>,
+    ) -> Result<Vec<u8>, Flaw> {
+        let plain = self.stamped(format, fields, None)?;
+        let tensors = parts(&plain).map(|(_, tensors)| tensors);
+        let Some(made) = made
+            .zip(tensors)
+            .map(|(by, tensors)| Made::new(by, tensors))
+        else {
+            return Ok(plain);
+        };
+        drop(plain);
+        self.stamped(format, fields, Some(made))
+    }
+
+    fn stamped(
+        &self,
+        format: Format,
+        fields: &impl Serialize,
+        made: Option<Made>,
     ) -> Result<Vec<u8>, Flaw> {
         let stamped = Stamped {
             format: format.name,
             version: format.version,
+            made,
             fields,
         };
         let header = serde_json::to_string(&stamped)
@@ -113,7 +136,7 @@ impl Writer {
         fields: &impl Serialize,
     ) -> Result<(), FileError> {
         let write = |bytes: Vec<u8>| super::replace(path, &bytes).map_err(Flaw::Write);
-        let written = self.to_bytes(format, fields).and_then(write);
+        let written = self.to_bytes(format, fields, None).and_then(write);
         written.map_err(|flaw| flaw.of(path, format))
     }
 }
@@ -210,9 +233,17 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The header of a file and the bytes of its tensors; `None` if the header is cut short.
+pub(super) fn parts(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let length = header_length(bytes).ok()?;
+    bytes
+        .get(LENGTH_BYTES..)?
+        .split_at_checked(usize::try_from(length).ok()?)
+}
+
 /// Our JSON object in the metadata of a file. Everything else in the file is passed over: what a newer version has there
 /// may be nothing that this one understands.
-fn header(bytes: &[u8]) -> Result<String, Flaw> {
+pub(super) fn header(bytes: &[u8]) -> Result<String, Flaw> {
     #[derive(Deserialize)]
     struct Metadata {
         mimic: Option<String>,
@@ -227,11 +258,10 @@ fn header(bytes: &[u8]) -> Result<String, Flaw> {
         let reason = format!("a header of {length} bytes");
         return Err(Flaw::Container { reason });
     }
-    let text = bytes.get(LENGTH_BYTES..LENGTH_BYTES + length as usize);
-    let outer: Outer =
-        serde_json::from_slice(text.ok_or_else(cut)?).map_err(|e| Flaw::Container {
-            reason: e.to_string(),
-        })?;
+    let (text, _) = parts(bytes).ok_or_else(cut)?;
+    let outer: Outer = serde_json::from_slice(text).map_err(|e| Flaw::Container {
+        reason: e.to_string(),
+    })?;
     let ours = outer.metadata.and_then(|metadata| metadata.mimic);
     ours.ok_or(Flaw::Foreign)
 }
@@ -277,7 +307,7 @@ mod tests {
         let mut writer = Writer::default();
         writer.push("numbers", &[2, 3], [1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let fields = json!({ "name": "walk", "fps": 30.0 });
-        writer.to_bytes(format, &fields).expect("it fits")
+        writer.to_bytes(format, &fields, None).expect("it fits")
     }
 
     /// A file with this header and nothing after it.
@@ -374,6 +404,37 @@ mod tests {
         assert!(!path.exists());
         assert!(readable(MOST_BYTES, MOST_BYTES).is_ok());
         assert!(readable(MOST_BYTES + 1, MOST_BYTES).is_err());
+    }
+
+    /// Whoever changes the numbers of a file makes it a file of their own.
+    #[test]
+    fn a_file_says_what_made_it_until_its_tensors_change() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("walk.clip");
+        let made_by = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("written");
+            crate::file::made_by(&path)
+        };
+        let mut writer = Writer::default();
+        writer.push("numbers", &[2], [1.0_f32, 2.0]);
+        let fields = json!({ "name": "walk" });
+        let made = |by| writer.to_bytes(FORMAT, &fields, by).expect("it fits");
+        assert_eq!(made_by(&made(Some("import"))).as_deref(), Some("import"));
+        assert_eq!(made_by(&made(None)), None);
+        assert_eq!(made_by(b"not a file of tensors"), None);
+        let mut changed = made(Some("import"));
+        let last = changed.last_mut().expect("there are bytes");
+        *last ^= 1;
+        assert_eq!(made_by(&changed), None);
+        let holds = |bytes: &[u8]| crate::file::holds(&path, bytes);
+        made_by(&made(Some("edit")));
+        assert!(holds(&made(Some("import"))) && holds(&made(None)));
+        assert!(!holds(&changed) && !holds(b"") && !holds(&file(FORMAT)));
+        // Readers pass over the field.
+        let bytes = made(Some("import"));
+        let reader = Reader::open(&bytes, FORMAT).expect("it is readable");
+        let values: Vec<f32> = reader.tensor("numbers", &[Some(2)]).expect("there");
+        assert_eq!(values, [1.0, 2.0]);
     }
 
     #[test]

@@ -68,6 +68,15 @@ impl Motion {
         Ok(self.writer().save(path.as_ref(), FORMAT, &self.header())?)
     }
 
+    /// The bytes of a motion file. It keeps the text `made`, which [`made_by`](file::made_by) reads.
+    ///
+    /// # Errors
+    /// [`MotionError::File`] when the motion's parts don't fit together.
+    pub fn to_bytes(&self, made: Option<&str>) -> Result<Vec<u8>, MotionError> {
+        let bytes = self.writer().to_bytes(FORMAT, &self.header(), made);
+        Ok(bytes.map_err(|flaw| flaw.of(self.name.as_ref(), FORMAT))?)
+    }
+
     /// Reads the motion file `path` and checks that all its parts fit together.
     ///
     /// # Errors

@@ -138,7 +138,7 @@ impl Explain for RunError {
             Self::Write { path, source } => {
                 Explanation::work(format!("cannot be written ({source})"))
                     .file(path)
-                    .remedy("check the path, its permissions and the free space there")
+                    .remedy("check the path, its permissions and the free space on the disk")
             }
             Self::Exists(path) => Explanation::input("already holds a run")
                 .file(path)

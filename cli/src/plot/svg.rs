@@ -1,5 +1,7 @@
 //! What all drawings share: the frame of the file, tick marks, and text.
 
+use mimic::explain::plain;
+
 /// Least distance between tick marks, pixels: a line of text needs about half of it.
 const TICK_ROOM: f64 = 30.0;
 
@@ -21,7 +23,8 @@ pub fn short(value: f64) -> String {
 
 /// Text as it may stand in an SVG file.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
+    let text = plain(text).replace('&', "&amp;");
+    text.replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// A whole SVG file, with its own style sheet and background.
@@ -44,6 +47,11 @@ text {{ font: 12px system-ui, sans-serif; fill: #333 }}
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_can_not_end_a_tag_or_break_the_file() {
+        assert_eq!(escaped("a<b>&\u{1b}\0c"), "a&lt;b&gt;&amp;  c");
+    }
 
     #[test]
     fn ticks_are_round_and_sparse() {

@@ -25,7 +25,12 @@ pub enum Side {
 /// Where a recording goes.
 pub enum Sink {
     /// An `.rrd` file.
-    File(PathBuf),
+    File {
+        /// Where it is.
+        path: PathBuf,
+        /// What made it, which its id says.
+        made: Option<String>,
+    },
     /// The address of a viewer that listens, e.g. `rerun+http://127.0.0.1:9876/proxy`.
     Viewer(String),
 }

@@ -11,7 +11,7 @@ mod save;
 
 pub use content::{Recording, Sink};
 pub use rrd::write;
-pub use save::{save, write_file};
+pub use save::{save, save_to, write_file};
 
 use crate::failure::{Failure, Outcome};
 

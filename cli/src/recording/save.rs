@@ -3,28 +3,28 @@
 use super::content::{Recording, Sink};
 use super::rrd::write;
 use crate::failure::{Failure, Outcome};
-use crate::output::make_room;
+use crate::output::Output;
+use mimic::file::Unfinished;
 use std::path::Path;
 
-/// Writes to a temporary file beside `path` and renames it, so that nobody finds half a recording.
-pub fn save(shown: &Recording, path: &Path, source: &Path) -> Outcome {
-    make_room(path, source, "rrd")?;
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mimic-").suffix(".rrd");
-    // Temporary files are private by default; this one becomes a file like any other.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let part = builder
-        .tempfile_in(folder.unwrap_or(Path::new(".")))
-        .map_err(|e| Failure::write(path, e))?;
-    write_file(shown, part.path(), path)?;
-    part.persist(path)
-        .map_err(|e| Failure::write(path, e.error))?;
-    Ok(())
+/// Writes the recording of a run into its folder, in place of an older one.
+pub fn save(shown: &Recording, path: &Path) -> Outcome {
+    let failed = |e| Failure::write(path, e);
+    let part = Unfinished::beside(path).map_err(failed)?;
+    write_file(shown, part.path(), path, None)?;
+    part.replace().map_err(failed)
+}
+
+/// Writes the recording where a command was told to.
+pub fn save_to(shown: &Recording, output: &Output) -> Outcome {
+    output.write_by(|part, made| write_file(shown, part, output.path(), made))
 }
 
 /// Writes into `part`, which becomes `path`.
-pub fn write_file(shown: &Recording, part: &Path, path: &Path) -> Outcome {
-    write(shown, &Sink::File(part.to_path_buf())).map_err(|e| Failure::write(path, e))
+pub fn write_file(shown: &Recording, part: &Path, path: &Path, made: Option<&str>) -> Outcome {
+    let sink = Sink::File {
+        path: part.to_path_buf(),
+        made: made.map(str::to_owned),
+    };
+    write(shown, &sink).map_err(|e| Failure::write(path, e))
 }

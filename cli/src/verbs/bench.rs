@@ -40,10 +40,10 @@ const HORIZON_S: f64 = 20.0;
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Length of each measurement, in seconds
-    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,
     /// Number of threads [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
     threads: Option<usize>,
 }
 

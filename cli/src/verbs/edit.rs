@@ -1,10 +1,10 @@
 //! `mimic edit`: makes one clip of others.
 
-use crate::args::{positive, span};
+use crate::args::{Replace, positive, span};
 use crate::clip_report::ClipReport;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{make_room, result_path};
+use crate::output::{Form, Maker, Output, result_path};
 use crate::printer::Printer;
 use mimic::clip::Clip;
 use mimic::clip::edit::Plane;
@@ -44,14 +44,16 @@ pub struct Args {
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    replace: Replace,
+    #[command(flatten)]
     edits: Edits,
 }
 
-#[derive(clap::Args)]
+#[derive(clap::Args, Debug)]
 #[command(next_help_heading = "Edits, in the order they are applied")]
 struct Edits {
     /// Part of each clip to keep, in seconds, e.g. 0.5..2
-    #[arg(long, value_name = "A..B", value_parser = span)]
+    #[arg(long, value_name = "A..B", value_parser = span, allow_hyphen_values = true)]
     trim: Option<(f64, f64)>,
     /// Swap left and right
     #[arg(long)]
@@ -60,19 +62,19 @@ struct Edits {
     #[arg(long, value_name = "FILE", requires = "mirror")]
     map: Option<PathBuf>,
     /// Seconds over which joined clips blend into each other [default: 0.2]
-    #[arg(long, value_name = "S", value_parser = not_negative)]
+    #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
     blend: Option<f64>,
     /// Cut out the best cycle and make its end lead into its start
     #[arg(long = "loop")]
     loops: bool,
     /// Shortest cycle that `--loop` may choose, in seconds [default: 0.5]
-    #[arg(long, value_name = "S", value_parser = positive, requires = "loops")]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true, requires = "loops")]
     shortest: Option<f64>,
     /// Playback speed factor: 2 is twice as fast, 0.5 half as fast
-    #[arg(long, value_name = "FACTOR", value_parser = positive, conflicts_with = "warp")]
+    #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true, conflicts_with = "warp")]
     speed: Option<f64>,
     /// Move moments in time: FROM:TO,FROM:TO in seconds; the time between them is stretched evenly
-    #[arg(long, value_name = "POINTS", value_parser = points)]
+    #[arg(long, value_name = "POINTS", value_parser = points, allow_hyphen_values = true)]
     warp: Option<Points>,
     /// Remove the steady travel over the ground
     #[arg(long)]
@@ -81,12 +83,12 @@ struct Edits {
     #[arg(long, value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
     travel: Option<(f64, f64)>,
     /// Frames per second to resample to
-    #[arg(long, value_name = "HZ", value_parser = positive)]
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     fps: Option<f64>,
 }
 
 /// Moments of a clip and when they are to happen, seconds.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 struct Points(Vec<(f64, f64)>);
 
 impl Args {
@@ -99,22 +101,24 @@ impl Args {
             .collect::<Outcome<_>>()?;
         let first = inputs[0].as_path();
         let stem = first.file_stem().unwrap_or_default().to_string_lossy();
-        let output = result_path(self.out.as_deref(), &format!("{stem}-edited"), "clip");
+        let path = result_path(self.out.as_deref(), &format!("{stem}-edited"), Form::Clip);
+        // Other edits of the same clips are another clip.
+        let maker = Maker::new("edit", &inputs).with(format!("{:?}", self.edits));
+        let output = Output::new(path, Form::Clip, maker, "--out", self.replace.force);
+        output.check()?;
         let mut clips = Vec::with_capacity(inputs.len());
         for input in &inputs {
             clips.push(self.edits.prepare(input)?);
         }
         let mut clip = self.edits.apply(clips, first)?;
         clip.name = output
+            .path()
             .file_stem()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        for input in &inputs {
-            make_room(&output, input, "clip")?;
-        }
-        clip.save(&output)?;
-        let report = ClipReport::new(&output, clip);
+        output.write(|made| Ok(clip.to_bytes(made)?))?;
+        let report = ClipReport::new(output.path(), clip);
         printer.problems(report.problems());
         printer.result(&report, || report.line())
     }

@@ -1,12 +1,13 @@
 //! `mimic eval`: measures how well an agent performs what it learned.
 
-use crate::args::at_least_one;
+use crate::args::{Replace, at_least_one};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output;
+use crate::output::{self, Form, Maker, Output};
 use crate::printer::Printer;
 use crate::runs;
 use mimic::evaluate::{FailedEpisode, Options};
+use mimic::explain::plain;
 use mimic::run::{CaseEvaluation, Run, RunError};
 use mimic::task::{Measure, Unit};
 use std::path::{Path, PathBuf};
@@ -34,21 +35,23 @@ pub struct Args {
     /// Run folder, or its name in runs/ [default: the newest run]
     run: Option<PathBuf>,
     /// Number of episodes; they start at phases spread evenly over the motion
-    #[arg(long, value_name = "N", default_value_t = Options::default().episodes, value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = Options::default().episodes, value_parser = at_least_one, allow_negative_numbers = true)]
     episodes: usize,
     /// Length of an episode in seconds, for looping motions; others play to their end
-    #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,
     /// Repeat every episode with shoves and with changed weight and friction, as in the run's training or else the usual ones;
     /// the reference then follows the agent [default: for runs that were trained with disturbances]
     #[arg(long)]
     perturb: bool,
     /// Number of threads; the result does not depend on it [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// Write the result to FILE, as JSON [default: the run's eval.json, if episodes and seconds have their defaults]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -68,7 +71,7 @@ impl Args {
         let out = self
             .out
             .as_deref()
-            .map(|out| place(out, &run))
+            .map(|out| place(out, &run, self.replace.force))
             .transpose()?;
         // Held from before the policy is read: the evaluation that is kept has to be that of the policy beside it.
         let held = match out {
@@ -77,7 +80,7 @@ impl Args {
         };
         let results = runs::evaluate(&run, &options, printer)?;
         let kept = match out {
-            Some(out) => write(&out, &results),
+            Some(out) => out.write_text(&CaseEvaluation::text(&results)),
             None => {
                 keep(&run, held, &results, printer);
                 Ok(())
@@ -92,8 +95,8 @@ impl Args {
 }
 
 /// Where `--out` puts the result: never in place of a file that a run is made of, such as its own evaluation.
-fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
-    let path = output::result_path(Some(out), "eval", "json");
+fn place(out: &Path, run: &Run, force: bool) -> Outcome<Output> {
+    let path = output::result_path(Some(out), "eval", Form::Evaluation);
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
@@ -109,15 +112,10 @@ fn place(out: &Path, run: &Run) -> Outcome<PathBuf> {
         return Err(Failure::input(&path, cause)
             .with_remedy("name a file elsewhere, or one such as `eval-long.json`"));
     }
-    output::spare_others(&path, "json")?;
-    Ok(path)
-}
-
-fn write(path: &Path, results: &[CaseEvaluation]) -> Outcome {
-    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
-    }
-    output::write_whole(path, CaseEvaluation::text(results).as_bytes())
+    let maker = Maker::new("eval", [run.dir()]);
+    let output = Output::new(path, Form::Evaluation, maker, "--out", force);
+    output.check()?;
+    Ok(output)
 }
 
 /// Whether these are the options by which runs are compared.
@@ -184,7 +182,9 @@ fn table(result: &CaseEvaluation) -> String {
         .iter()
         .map(|(name, value)| format!("  {name:38} {value:>12}\n"))
         .collect();
-    format!("{name}, {} episodes\n{lines}", found.episodes)
+    let (name, episodes) = (plain(name), found.episodes);
+    let noun = if episodes == 1 { "episode" } else { "episodes" };
+    format!("{name}, {episodes} {noun}\n{lines}")
 }
 
 /// A measure with its unit.

@@ -1,11 +1,12 @@
 //! `mimic import`: reads animation files and writes clips.
 
-use crate::args::ImportArgs;
+use crate::args::{ImportArgs, Replace};
 use crate::clip_report::ClipReport;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{make_room, names_folder, result_path, safe_name};
+use crate::output::{Form, Maker, Output, names_folder, result_path, safe_name};
 use crate::printer::Printer;
+use mimic::explain::plain;
 use mimic::import;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -33,6 +34,8 @@ pub struct Args {
     #[arg(long)]
     mirror: bool,
     #[command(flatten)]
+    replace: Replace,
+    #[command(flatten)]
     import: ImportArgs,
 }
 
@@ -44,7 +47,7 @@ struct Step {
     input: PathBuf,
     /// As for [`import::Options`].
     take: Option<String>,
-    output: PathBuf,
+    output: Output,
 }
 
 impl Args {
@@ -54,7 +57,7 @@ impl Args {
         let bar = printer.progress(steps.len() as u64, "{bar:30} {pos}/{len} {msg}");
         let (mut reports, mut failures) = (Vec::new(), Vec::new());
         for step in &steps {
-            bar.set_message(step.input.display().to_string());
+            bar.set_message(plain(&step.input.display().to_string()));
             match self.import(step) {
                 Ok(report) => {
                     bar.suspend(|| printer.problems(report.problems()));
@@ -87,18 +90,19 @@ impl Args {
         for file in &self.files {
             let input = locate::clip(file, library, &locate::SOURCES)?;
             for (take, name) in self.takes(&input)? {
-                let output = result_path(self.out.as_deref(), &name, "clip");
-                if let Some(other) = taken.insert(output.clone(), input.clone()) {
-                    let (other, output) = (other.display(), output.display());
+                let path = result_path(self.out.as_deref(), &name, Form::Clip);
+                if let Some(other) = taken.insert(path.clone(), input.clone()) {
+                    let (other, output) = (other.display(), path.display());
                     let cause =
                         format!("its clip would be `{output}`, and so would that of `{other}`");
                     return Err(Failure::input(&input, cause)
                         .with_remedy("import the two into different folders (`--out`)"));
                 }
+                let maker = Maker::new("import", [&input]).with(&name);
                 steps.push(Step {
                     input: input.clone(),
                     take,
-                    output,
+                    output: Output::new(path, Form::Clip, maker, "--out", self.replace.force),
                 });
             }
         }
@@ -153,15 +157,15 @@ impl Args {
                 "pass it to `mimic retarget` as it is, or change it with `mimic edit`",
             ));
         }
+        output.check()?;
         let options = import::Options {
             take: take.clone(),
             mirror: self.mirror,
             ..self.import.options()
         };
         let clip = import::load(input, &options)?;
-        make_room(output, input, "clip")?;
-        clip.save(output)?;
-        Ok(ClipReport::new(output, clip))
+        output.write(|made| Ok(clip.to_bytes(made)?))?;
+        Ok(ClipReport::new(output.path(), clip))
     }
 }
 
@@ -175,7 +179,7 @@ fn finish(reports: &[ClipReport], failed: Vec<Failed>, printer: &Printer) -> Out
     }
     let entry = |(file, failure): &Failed| {
         let mut entry = failure.json();
-        entry["file"] = json!(file);
+        entry["file"] = json!(file.display().to_string());
         entry
     };
     let entries: Vec<_> = failed.iter().map(entry).collect();

@@ -1,10 +1,12 @@
 //! `mimic info`: what is in an animation file.
 
+use crate::args::Replace;
 use crate::failure::Outcome;
 use crate::locate;
-use crate::output::{make_room, write_whole};
+use crate::output::{Form, Maker, Output};
 use crate::printer::Printer;
 use mimic::clip::{Clip, Joint, Problem, Severity};
+use mimic::explain::plain;
 use mimic::humanoid::{self, HumanoidMap, Slot};
 use mimic::import::{self, TakeInfo};
 use serde::Serialize;
@@ -27,6 +29,8 @@ pub struct Args {
     /// Write the joint map to FILE, to edit it and pass it to `mimic retarget --map`
     #[arg(long, value_name = "FILE")]
     write_map: Option<PathBuf>,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 /// What is in a file of any kind.
@@ -65,8 +69,10 @@ impl Args {
         };
         report.map = rows(&map, &joints);
         if let Some(path) = &self.write_map {
-            make_room(path, &file, "json")?;
-            write_whole(path, map_file(&map, &joints).as_bytes())?;
+            let maker = Maker::new("info", [&file]);
+            let force = self.replace.force;
+            let output = Output::new(path.clone(), Form::Map, maker, "--write-map", force);
+            output.write_text(&map_file(&map, &joints))?;
             tell(path, &map, printer);
         }
         printer.result(&report, || text(&report))
@@ -169,14 +175,18 @@ pub fn rows(map: &HumanoidMap, joints: &[Joint]) -> Vec<Row> {
 }
 
 fn text(report: &Report) -> String {
-    let mut text = format!(
-        "{}: {}, {} up, {} m per unit, {} joints\n",
-        report.file,
-        report.format,
-        report.up_axis,
-        report.unit_m,
-        report.joints.len()
-    );
+    let mut text = String::new();
+    let Report {
+        file,
+        format,
+        up_axis,
+        unit_m,
+        joints,
+        ..
+    } = report;
+    let joints = joints.len();
+    let head = format!("{file}: {format}, {up_axis} up, {unit_m} m per unit, {joints} joints");
+    line(&mut text, head);
     section(&mut text, "takes");
     for (index, take) in report.takes.iter().enumerate() {
         line(&mut text, take_line(index + 1, take));
@@ -224,10 +234,11 @@ fn map_line(row: &Row) -> String {
 }
 
 fn section(text: &mut String, title: &str) {
-    line(text, format!("\n{title}"));
+    text.push('\n');
+    line(text, title.to_owned());
 }
 
-/// Adds a line. Writing to a string cannot fail.
+/// Adds a line, whatever the names in it hold. Writing to a string cannot fail.
 fn line(text: &mut String, line: String) {
-    writeln!(text, "{}", line.trim_end()).ok();
+    writeln!(text, "{}", plain(line.trim_end())).ok();
 }

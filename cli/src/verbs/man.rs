@@ -1,7 +1,8 @@
 //! `mimic man`: prints or writes the manual pages.
 
+use crate::args::Replace;
 use crate::failure::{Failure, Outcome};
-use crate::output::write_whole;
+use crate::output::{Form, Maker, Output, make_folder};
 use crate::printer::Printer;
 use clap::Command;
 use clap_mangen::Man;
@@ -20,6 +21,8 @@ pub struct Args {
     /// Folder to write mimic.1 and a page per command to
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 impl Args {
@@ -31,20 +34,22 @@ impl Args {
             let page = page(command)?;
             return printer.result(&json!({ "text": page }), || page.clone());
         };
-        let pages = write_pages(&command, &folder)?;
+        let pages = write_pages(&command, &folder, self.replace.force)?;
         printer.result(&json!({ "pages": pages }), || pages.join("\n"))
     }
 }
 
-fn write_pages(command: &Command, folder: &Path) -> Outcome<Vec<String>> {
-    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+fn write_pages(command: &Command, folder: &Path, force: bool) -> Outcome<Vec<String>> {
+    make_folder(folder)?;
     std::iter::once(command)
         .chain(command.get_subcommands())
         .map(|command| {
             let name = command.get_display_name().unwrap_or(command.get_name());
             let path = folder.join(format!("{name}.1"));
-            write_whole(&path, page(command.clone())?.as_bytes())?;
-            Ok(path.display().to_string())
+            let maker = Maker::new("man", [] as [&Path; 0]).with(name);
+            let output = Output::new(path, Form::Page, maker, "--out", force);
+            output.write_text(&page(command.clone())?)?;
+            Ok(output.path().display().to_string())
         })
         .collect()
 }

@@ -1,10 +1,12 @@
 //! `mimic plot`: draws the learning curves of runs.
 
+use crate::args::Replace;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output;
+use crate::output::{self, Form, Maker, Output};
 use crate::plot::curves::{self, Curve, Panel, Scale};
 use crate::printer::Printer;
+use mimic::explain::plain;
 use mimic::file::text_at_most;
 use mimic::run::files;
 use serde_json::{Map, Value, json};
@@ -63,11 +65,13 @@ pub struct Args {
     #[arg(value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Iterations to average each point over; 1 for none [default: a fiftieth of the run]
-    #[arg(long, value_name = "N", value_parser = crate::args::at_least_one)]
+    #[arg(long, value_name = "N", value_parser = crate::args::at_least_one, allow_negative_numbers = true)]
     smooth: Option<usize>,
     /// SVG file to write, or a folder [default: RUN.svg, or curves.svg for several runs]
     #[arg(long, short, value_name = "FILE.svg")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 /// What a run logged while it learned.
@@ -98,14 +102,14 @@ impl Args {
             [one] => one.name.as_str(),
             _ => "curves",
         };
-        let path = output::result_path(self.out.as_deref(), file, "svg");
-        for log in &logs {
-            output::make_room(&path, &log.folder.join(files::METRICS), "svg")?;
-        }
+        let path = output::result_path(self.out.as_deref(), file, Form::Drawing);
+        let maker = Maker::new("plot", &folders);
+        let output = Output::new(path, Form::Drawing, maker, "--out", self.replace.force);
         let panels = panels(&logs, self.smooth);
-        output::write_whole(&path, curves::curves(&names, &panels).as_bytes())?;
-        let report = report(&path, &names, &logs);
-        printer.result(&report, || summary(&path, &names, &logs))
+        output.write_text(&curves::curves(&names, &panels))?;
+        let path = output.path();
+        let report = report(path, &names, &logs);
+        printer.result(&report, || summary(path, &names, &logs))
     }
 }
 
@@ -245,7 +249,7 @@ fn report(path: &Path, names: &[String], logs: &[Log]) -> Value {
             let value = |line: &Map<String, Value>| line.get(field).cloned().unwrap_or_default();
             log.lines.iter().map(value).collect()
         };
-        let mut run = json!({ "run": log.folder, "name": name, "samples": column("samples") });
+        let mut run = json!({ "run": log.folder.display().to_string(), "name": name, "samples": column("samples") });
         for (field, ..) in FIGURES {
             run[field] = column(field).into();
         }
@@ -254,18 +258,19 @@ fn report(path: &Path, names: &[String], logs: &[Log]) -> Value {
         run
     };
     let runs: Vec<Value> = names.iter().zip(logs).map(run).collect();
-    json!({ "plot": path, "runs": runs })
+    json!({ "plot": path.display().to_string(), "runs": runs })
 }
 
 fn summary(path: &Path, names: &[String], logs: &[Log]) -> String {
-    let mut text = format!("{}\n", path.display());
+    let mut text = format!("{}\n", plain(&path.display().to_string()));
     for (name, log) in names.iter().zip(logs) {
         let last = log.points("normalized_return").last().map(|(_, y)| *y);
         let figure = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
         text += &format!(
-            "  {name}: {} iterations, {:.2} M samples, normalised return {}, survival {}, local error {} mm\n",
+            "  {}: {} iterations, {:.2} M samples, normalised return {}, survival {}, local error {} mm\n",
+            plain(name),
             log.lines.len(),
             log.samples() / 1e6,
             figure(last, 3),

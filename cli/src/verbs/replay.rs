@@ -1,15 +1,16 @@
 //! `mimic replay`: shows an agent with its reference, or a motion, in the rerun viewer.
 
-use crate::args::{ImportArgs, RetargetArgs, at_least_one};
+use crate::args::{ImportArgs, Replace, RetargetArgs, at_least_one};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::result_path;
+use crate::output::{Form, Maker, Output, names_folder, result_path};
 use crate::prepare::Preparation;
 use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
 use crate::runs;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
+use mimic::explain::plain;
 use mimic::task::{EpisodeStart, StartState};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -57,11 +58,13 @@ pub struct Args {
     what: Option<PathBuf>,
     #[command(flatten)]
     sinks: Sinks,
+    #[command(flatten)]
+    replace: Replace,
     /// Show the reference beside the agent instead of in the same place
     #[arg(long)]
     beside: bool,
     /// Length of the replay in seconds, for looping motions of a run [default: 10; in a sequence 4 for each]
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Phase at which the agent starts, from 0 to 1; `mimic eval` lists those from which it fails [default: 0]
     #[arg(
@@ -77,7 +80,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "sequence")]
     perturb: bool,
     /// Motion to show of a run that learned several, by number from 1 [default: 1]
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
     motion: Option<usize>,
     /// Motions of a run to perform one after another, by name or a part of it; looping ones last `--seconds`, others play to
     /// their end
@@ -119,16 +122,28 @@ impl Args {
         let viewer = (self.sinks.rerun || self.sinks.serve)
             .then(Viewer::require)
             .transpose()?;
-        let (mut shown, source) = self.record(library, printer)?;
+        let source = self.source(library)?;
+        if let Some(save) = self
+            .sinks
+            .save
+            .as_deref()
+            .filter(|save| !names_folder(save))
+        {
+            self.output(save.to_owned(), &source).check()?;
+        }
+        let mut shown = self.record(&source, printer)?;
         if self.beside {
             shown.beside = BESIDE;
         }
-        let saved = self.sinks.file(&shown.name);
+        let path = |save| result_path(Some(save), &shown.name, Form::Recording);
+        let output = self.sinks.save.as_deref().map(path);
+        let output = output.map(|path| self.output(path, &source));
         self.sinks
-            .show(&shown, &source, saved.as_deref(), viewer.as_ref(), printer)?;
+            .show(&shown, output.as_ref(), viewer.as_ref(), printer)?;
+        let saved = output.as_ref().map(Output::path);
         let json = json!({
             "name": shown.name,
-            "recording": saved,
+            "recording": saved.map(|path| path.display().to_string()),
             "frames": shown.frames(),
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
@@ -136,21 +151,50 @@ impl Args {
             "shoves": shown.shoves,
             "failed_s": shown.failed_s,
         });
-        printer.result(&json, || summary(&shown, saved.as_deref(), self.perturb))
+        printer.result(&json, || summary(&shown, saved, self.perturb))
+    }
+}
+
+/// What is replayed.
+enum Source {
+    Run(PathBuf),
+    Animation(PathBuf),
+}
+
+impl Source {
+    fn path(&self) -> &Path {
+        match self {
+            Self::Run(path) | Self::Animation(path) => path,
+        }
     }
 }
 
 impl Args {
     /// A run by path or name, else an animation by path or name; left out, the newest run, else the newest motion.
-    fn record(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
+    fn source(&self, library: &Path) -> Outcome<Source> {
         let run = match &self.what {
             Some(what) => locate::existing_run(what),
             None => locate::newest_run(),
         };
-        match run {
-            Some(run) => Ok((self.record_run(&run, printer)?, run)),
-            None => self.record_motion(library, printer),
+        if let Some(run) = run {
+            return Ok(Source::Run(run));
         }
+        let what = self.what.as_deref();
+        let file = locate::file_or_newest(what, library, &locate::ANIMATIONS, "motion")?;
+        Ok(Source::Animation(file))
+    }
+
+    fn record(&self, source: &Source, printer: &Printer) -> Outcome<Recording> {
+        match source {
+            Source::Run(run) => self.record_run(run, printer),
+            Source::Animation(file) => self.record_motion(file, printer),
+        }
+    }
+
+    /// The file of `--save`.
+    fn output(&self, path: PathBuf, source: &Source) -> Output {
+        let maker = Maker::new("replay", [source.path()]).with(self.import.take().unwrap_or(""));
+        Output::new(path, Form::Recording, maker, "--save", self.replace.force)
     }
 
     fn record_run(&self, run: &Path, printer: &Printer) -> Outcome<Recording> {
@@ -171,14 +215,11 @@ impl Args {
         runs::record(&run, start, self.seconds.unwrap_or(SECONDS))
     }
 
-    fn record_motion(&self, library: &Path, printer: &Printer) -> Outcome<(Recording, PathBuf)> {
-        let what = self.what.as_deref();
-        let source = locate::file_or_newest(what, library, &locate::ANIMATIONS, "motion")?;
-        self.refuse_agent_flags(&source)?;
-        let preparation = Preparation::new(source.clone(), &self.import, &self.retarget);
+    fn record_motion(&self, file: &Path, printer: &Printer) -> Outcome<Recording> {
+        self.refuse_agent_flags(file)?;
+        let preparation = Preparation::new(file.to_owned(), &self.import, &self.retarget);
         let prepared = preparation.run(printer)?;
-        let recording = Recording::of_motion(&prepared.motion, &prepared.skeleton);
-        Ok((recording, source))
+        Ok(Recording::of_motion(&prepared.motion, &prepared.skeleton))
     }
 
     /// Refuses flags about an agent where there is none: nothing is ignored silently.
@@ -221,29 +262,22 @@ fn summary(shown: &Recording, saved: Option<&Path>, perturbed: bool) -> String {
         (true, 1) => ", disturbed, with 1 shove".to_owned(),
         (true, count) => format!(", disturbed, with {count} shoves"),
     };
-    format!(
+    plain(&format!(
         "{place}: {who}{how}, {frames} frames at {:.1} Hz{failed}",
         shown.fps
-    )
+    ))
 }
 
 impl Sinks {
-    /// The file that `--save` means.
-    fn file(&self, name: &str) -> Option<PathBuf> {
-        let save = self.save.as_deref()?;
-        Some(result_path(Some(save), name, "rrd"))
-    }
-
     fn show(
         &self,
         shown: &Recording,
-        source: &Path,
-        saved: Option<&Path>,
+        output: Option<&Output>,
         viewer: Option<&Viewer>,
         printer: &Printer,
     ) -> Outcome {
-        if let Some(path) = saved {
-            recording::save(shown, path, source)?;
+        if let Some(output) = output {
+            recording::save_to(shown, output)?;
         }
         if let Some(place) = &self.connect {
             send(shown, viewer::address(place))?;
@@ -283,6 +317,6 @@ fn serve(shown: &Recording, viewer: &Viewer) -> Outcome {
     let mut builder = tempfile::Builder::new();
     let file = builder.prefix("mimic-").suffix(".rrd").tempfile();
     let file = file.map_err(failed)?;
-    recording::write_file(shown, file.path(), file.path())?;
+    recording::write_file(shown, file.path(), file.path(), None)?;
     viewer.serve(file.path())
 }

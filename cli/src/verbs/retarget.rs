@@ -1,12 +1,13 @@
 //! `mimic retarget`: makes a clip a motion of a physics character.
 
-use crate::args::{ImportArgs, RetargetArgs};
+use crate::args::{ImportArgs, Replace, RetargetArgs};
 use crate::checks;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
-use crate::output::{make_room, result_path, spare_input};
+use crate::output::{Form, Maker, Output, result_path};
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
+use mimic::explain::plain;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,8 @@ pub struct Args {
     #[arg(long)]
     to_perform: bool,
     #[command(flatten)]
+    replace: Replace,
+    #[command(flatten)]
     retarget: RetargetArgs,
     #[command(flatten)]
     import: ImportArgs,
@@ -47,20 +50,22 @@ impl Args {
             return Err(Failure::input(&file, "this is a motion already")
                 .with_remedy("give the clip that it was made from"));
         }
-        let output = result_path(self.out.as_deref(), &preparation.name(), "motion");
-        spare_input(&output, &file)?;
+        let name = preparation.name();
+        let path = result_path(self.out.as_deref(), &name, Form::Motion);
+        let maker = Maker::new("retarget", [&file]).with(name);
+        let output = Output::new(path, Form::Motion, maker, "--out", self.replace.force);
+        output.check()?;
         let Prepared {
             motion,
             skeleton,
             seconds,
         } = preparation.run(printer)?;
         let quality = motion.quality(&skeleton);
-        make_room(&output, &file, "motion")?;
         let seconds = seconds.unwrap_or_default();
-        motion.save(&output)?;
+        output.write(|made| Ok(motion.to_bytes(made)?))?;
         let frames = motion.qpos.len();
         let mut report = json!({
-            "motion": output,
+            "motion": output.path().display().to_string(),
             "frames": frames,
             "fps": motion.fps,
             "seconds": seconds,
@@ -83,7 +88,7 @@ fn text(report: &Value) -> String {
             .and_then(Value::as_f64)
             .unwrap_or_default()
     };
-    let motion = report["motion"].as_str().unwrap_or_default();
+    let motion = plain(report["motion"].as_str().unwrap_or_default());
     format!(
         "{motion}: {} frames at {:.1} Hz in {:.2} s\n  \
          keypoint error   mean {:.1} cm, max {:.1} cm\n  \

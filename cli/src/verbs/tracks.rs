@@ -1,14 +1,15 @@
 //! `mimic tracks`: shows how a motion's body moves as a whole.
 
-use crate::args::{ImportArgs, RetargetArgs};
+use crate::args::{ImportArgs, Replace, RetargetArgs};
 use crate::checks;
 use crate::failure::Outcome;
 use crate::locate;
-use crate::output::{make_room, write_whole};
+use crate::output::{Form, Maker, Output};
 use crate::plot;
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use mimic::clip::LoopMode;
+use mimic::explain::plain;
 use mimic::motion::{Check, ContactShare, Extent, Motion, Summary};
 use mimic::skeleton::Skeleton;
 use serde::Serialize;
@@ -34,6 +35,8 @@ pub struct Args {
     /// Write the tracks of every frame to FILE.csv, as comma-separated values
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    replace: Replace,
     #[command(flatten)]
     import: ImportArgs,
     #[command(flatten)]
@@ -66,29 +69,42 @@ impl Args {
             "motion",
         )?;
         let preparation = Preparation::new(file, &self.import, &self.retarget);
+        let plot = self.output(self.plot.as_deref(), "--plot", Form::Drawing, &preparation);
+        let csv = self.output(self.csv.as_deref(), "--csv", Form::Table, &preparation);
+        for output in plot.iter().chain(&csv) {
+            output.check()?;
+        }
         let Prepared {
             motion, skeleton, ..
         } = preparation.run(printer)?;
-        if let Some(path) = &self.plot {
-            save(
-                (path, "svg"),
-                &preparation.file,
-                &plot::tracks(&motion),
-                printer,
-            )?;
+        // The one that may be refused comes first.
+        if let Some(output) = csv {
+            save(&output, &table(&motion), printer)?;
         }
-        if let Some(path) = &self.csv {
-            save((path, "csv"), &preparation.file, &table(&motion), printer)?;
+        if let Some(output) = plot {
+            save(&output, &plot::tracks(&motion), printer)?;
         }
         let report = report(&motion, &skeleton);
         printer.result(&report, || text(&report))
     }
+
+    /// The file of a flag, if that was given.
+    fn output(
+        &self,
+        path: Option<&Path>,
+        flag: &'static str,
+        form: Form,
+        source: &Preparation,
+    ) -> Option<Output> {
+        let maker = Maker::new("tracks", [&source.file]).with(source.name());
+        let path = path?.to_owned();
+        Some(Output::new(path, form, maker, flag, self.replace.force))
+    }
 }
 
-fn save((path, extension): (&Path, &str), input: &Path, text: &str, printer: &Printer) -> Outcome {
-    make_room(path, input, extension)?;
-    write_whole(path, text.as_bytes())?;
-    printer.note(format!("wrote {}", path.display()));
+fn save(output: &Output, text: &str, printer: &Printer) -> Outcome {
+    output.write_text(text)?;
+    printer.note(format!("wrote {}", output.path().display()));
     Ok(())
 }
 
@@ -114,8 +130,8 @@ fn text(report: &Report) -> String {
     };
     let mut text = format!(
         "{} on {}: {} frames at {:.1} Hz, {:.2} s, {loops}\n\n{:32} {:>9} {:>9} {:>9}\n",
-        report.motion,
-        report.skeleton,
+        plain(&report.motion),
+        plain(&report.skeleton),
         report.frames,
         report.fps,
         report.duration_s,
@@ -136,7 +152,7 @@ fn text(report: &Report) -> String {
         writeln!(text, "{name:32} {min:9.2} {mean:9.2} {max:9.2}").ok();
     }
     for ContactShare { body, share } in &summary.contacts {
-        let name = format!("{body} on the ground");
+        let name = plain(&format!("{body} on the ground"));
         writeln!(text, "{name:32} {:>8.0} %", 100.0 * share).ok();
     }
     let [x, y, _] = report.cycle_translation_m;
@@ -173,8 +189,17 @@ fn header(motion: &Motion) -> Vec<String> {
         header.extend(["x", "y", "z"].map(|axis| format!("{name}_{axis}")));
     }
     let contacts = motion.contact_names();
-    header.extend(contacts.iter().map(|body| format!("contact_{body}")));
+    header.extend(contacts.iter().map(|body| cell(&format!("contact_{body}"))));
     header
+}
+
+/// A name as a cell of a table: on one line, and in quotes where it has to be.
+fn cell(name: &str) -> String {
+    let name = plain(name);
+    if name.contains([',', '"']) {
+        return format!("\"{}\"", name.replace('"', "\"\""));
+    }
+    name
 }
 
 /// The values of one frame, in the order of the header.

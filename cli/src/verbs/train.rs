@@ -7,7 +7,7 @@ mod resume;
 mod setting;
 mod stop;
 
-use crate::args::{ImportArgs, RetargetArgs, at_least_one};
+use crate::args::{ImportArgs, RetargetArgs, at_least_one, samples, whole};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::prepare::{Preparation, Prepared};
@@ -76,16 +76,16 @@ pub struct Args {
     #[arg(long)]
     perturb: bool,
     /// Number of samples to learn from, e.g. 5M or 800k [default: that of the preset]
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
     samples: Option<u64>,
     /// Stop after this many minutes, even if samples are left
-    #[arg(long, value_name = "MIN", value_parser = minutes)]
+    #[arg(long, value_name = "MIN", value_parser = minutes, allow_negative_numbers = true)]
     minutes: Option<f64>,
     /// Random seed; the same seed gives the same result, bit for bit [default: that of the preset]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Number of threads; the result does not depend on it [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// Continue a run that was stopped
     #[arg(
@@ -320,47 +320,4 @@ fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Ou
 
 fn minutes(text: &str) -> Result<f64, String> {
     runs::at_most(text, MOST_MINUTES, "minutes")
-}
-
-/// A whole number, with k for thousands and M for millions.
-fn count(text: &str) -> Result<u64, String> {
-    let (number, unit) = match text.trim_end_matches(['k', 'K', 'm', 'M']) {
-        number if number.len() + 1 < text.len() => {
-            return Err("write a number such as 60k, 800k or 5M".to_owned());
-        }
-        number => (number, &text[number.len()..]),
-    };
-    let factor = match unit {
-        "" => 1.0,
-        "k" | "K" => 1e3,
-        _ => 1e6,
-    };
-    let value: f64 = number
-        .parse()
-        .map_err(|_| "give a number, e.g. 5M or 800k".to_string())?;
-    let value = value * factor;
-    if (1.0..=1e15).contains(&value) {
-        Ok(value as u64)
-    } else {
-        Err("must be at least 1".into())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn counts_have_units() {
-        assert_eq!(count("4096"), Ok(4096));
-        assert_eq!(count("800k"), Ok(800_000));
-        assert_eq!(count("2.5M"), Ok(2_500_000));
-        assert_eq!(count("1e6"), Ok(1_000_000));
-        assert!(
-            count("0").is_err()
-                && count("-5").is_err()
-                && count("5kM").is_err()
-                && count("M").is_err()
-        );
-    }
 }

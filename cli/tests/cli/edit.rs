@@ -104,7 +104,7 @@ fn three_walks_become_one_cycle() {
         "-1,0.5",
     ]);
     assert_eq!((frames(&cycle), cycle["loop"].as_str()), (34, Some("wrap")));
-    let longer = bench.json(&["edit", "long.clip", "--loop", "--shortest", "2"]);
+    let longer = bench.json(&["edit", "long.clip", "--loop", "--shortest", "2", "--force"]);
     assert_eq!(frames(&longer), 67);
     let combo = bench.json(&[
         "edit",

@@ -127,6 +127,31 @@ fn files_are_named_once_with_a_remedy() {
     );
 }
 
+/// Whoever runs the tests may be allowed to write anywhere, but not in the system's own view of itself.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_message_has_the_name_of_a_temporary_file() {
+    let bench = Workbench::with_clip();
+    for line in [
+        &["import", "sway.txt", "--out", "/proc/sway.clip"][..],
+        &["retarget", "sway.txt", "--out", "/proc/sway.motion"],
+        &["tracks", "sway.txt", "--csv", "/proc/sway.csv"],
+        &["tracks", "sway.txt", "--plot", "/proc/sway.svg"],
+        &["info", "sway.txt", "--write-map", "/proc/map.json"],
+        #[cfg(feature = "rerun")]
+        &["replay", "sway.txt", "--save", "/proc/sway.rrd"],
+    ] {
+        let error = bench.error_about(line[3], line, 1);
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains("cannot be written ("), "{message}");
+        assert!(
+            message.contains("(os error "),
+            "the system's reason: {message}"
+        );
+        assert!(!message.contains(".mimic-"), "{message}");
+    }
+}
+
 #[test]
 fn what_cannot_be_written_is_named_once_with_a_remedy() {
     let bench = Workbench::with_clip();
@@ -136,7 +161,9 @@ fn what_cannot_be_written_is_named_once_with_a_remedy() {
         ("import", "taken/sway.clip"),
         ("retarget", "taken/sway.motion"),
     ] {
-        bench.error_about(file, &[verb, "sway.txt", "--out", "taken/"], 1);
+        let error = bench.error_about(file, &[verb, "sway.txt", "--out", "taken/"], 2);
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains("this is a folder"), "{message}");
     }
 }
 

@@ -8,9 +8,13 @@ mod series;
 mod tests;
 mod world;
 
+use crate::output::recording_id;
 use crate::recording::content::{Recording, Sink};
 use names::{APPLICATION, TIMELINE};
-use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimeColumn};
+use rerun::external::re_log_types::StoreId;
+use rerun::{
+    RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreKind, TimeColumn,
+};
 use std::time::Duration;
 
 /// How long a viewer may take to receive a whole recording; on one machine that is well below a second.
@@ -22,11 +26,21 @@ const FLUSH: Duration = Duration::from_secs(30);
 /// A file that cannot be written, or a viewer that goes away.
 pub fn write(shown: &Recording, sink: &Sink) -> Result<(), Box<dyn std::error::Error>> {
     // The user asked for a recording, so it is written even where the variable RERUN turns the SDK off.
-    let builder = RecordingStreamBuilder::new(APPLICATION)
+    let mut builder = RecordingStreamBuilder::new(APPLICATION)
         .recording_name(&shown.name)
         .enabled(true);
+    if let Sink::File {
+        made: Some(made), ..
+    } = sink
+    {
+        // Two recordings of one id would be one to the viewer, so its end is random. Who sets an id is taken for one of
+        // several writers, and has to say that it sends the name.
+        let random = StoreId::random(StoreKind::Recording, APPLICATION);
+        let id = format!("{}{}", recording_id(made), random.recording_id());
+        builder = builder.recording_id(id).send_properties(true);
+    }
     let stream = match sink {
-        Sink::File(path) => builder.save(path)?,
+        Sink::File { path, .. } => builder.save(path)?,
         Sink::Viewer(address) => builder.connect_grpc_opts(address)?,
     };
     log(&stream, shown)?;

@@ -79,7 +79,11 @@ fn waving() -> Recording {
 fn a_recording_of_two_characters_is_written() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let path = folder.path().join("waving.rrd");
-    write(&waving(), &Sink::File(path.clone())).expect("the recording is written");
+    let sink = Sink::File {
+        path: path.clone(),
+        made: None,
+    };
+    write(&waving(), &sink).expect("the recording is written");
     let bytes = std::fs::read(&path).expect("the recording is there");
     assert_eq!(&bytes[..3], b"RRF");
     assert!(bytes.len() > 20_000, "{} bytes", bytes.len());

@@ -69,7 +69,7 @@ fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
     match runs::record(run, start, REPLAY_S) {
         Ok(shown) => {
             let file = run.dir().join(files::RECORDING);
-            recording::save(&shown, &file, run.dir())?;
+            recording::save(&shown, &file)?;
             Ok(Some(file))
         }
         Err(failure) => {

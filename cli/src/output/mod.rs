@@ -1,0 +1,245 @@
+//! Where results are written, and what they never replace.
+
+mod form;
+mod maker;
+
+pub use form::Form;
+#[cfg(feature = "rerun")]
+pub use form::recording_id;
+pub use maker::Maker;
+
+use crate::failure::{Failure, Outcome};
+use crate::locate;
+use mimic::file::Unfinished;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A file that a command writes as a whole or not at all.
+///
+/// It takes the place of a file that the same command made from the same inputs, even with other options: that is how
+/// people work on a result. Of any other file it does with `--force` alone, and never of an input. A file that holds the
+/// same already stays.
+pub struct Output {
+    path: PathBuf,
+    form: Form,
+    maker: Maker,
+    /// The flag that names it.
+    flag: &'static str,
+    force: bool,
+}
+
+impl Output {
+    /// With the path of `flag`, or one that follows from it.
+    pub fn new(path: PathBuf, form: Form, maker: Maker, flag: &'static str, force: bool) -> Self {
+        Self {
+            path,
+            form,
+            maker,
+            flag,
+            force,
+        }
+    }
+
+    /// Where it is written.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Refuses, before the work, what would be refused after it. Creates nothing.
+    pub fn check(&self) -> Outcome {
+        self.spare_inputs()?;
+        self.check_name()?;
+        let path = &self.path;
+        if path.exists() && !path.is_file() {
+            let cause = "this is not a file of the disk that could be replaced";
+            return Err(Failure::input(path, cause).with_remedy(self.elsewhere()));
+        }
+        let is_clear = self.force || !is_taken(path) || !self.form.is_judged_by_mark();
+        match is_clear || self.is_ours(self.mark().as_deref()) {
+            true => Ok(()),
+            false => Err(self.refused()),
+        }
+    }
+
+    /// Writes these bytes, which may hold what made them.
+    pub fn write(&self, bytes: impl FnOnce(Option<&str>) -> Outcome<Vec<u8>>) -> Outcome {
+        self.make_folder()?;
+        self.check()?;
+        let mark = self.mark();
+        let bytes = bytes(mark.as_deref())?;
+        if is_taken(&self.path) && self.form.holds(&self.path, &bytes) {
+            return Ok(());
+        }
+        let file = || {
+            let mut file = Unfinished::beside(&self.path)?;
+            file.file().write_all(&bytes)?;
+            Ok(file)
+        };
+        self.settle(file().map_err(|e| self.unwritten(e))?, mark.as_deref())
+    }
+
+    /// Writes a text, with what made it where the form has a place for that.
+    pub fn write_text(&self, text: &str) -> Outcome {
+        self.write(|mark| {
+            let text = match mark {
+                Some(mark) => self.form.marked(text, mark),
+                None => text.to_owned(),
+            };
+            Ok(text.into_bytes())
+        })
+    }
+
+    /// Lets `write` write to a path of its own, with what made it.
+    pub fn write_by(&self, write: impl FnOnce(&Path, Option<&str>) -> Outcome) -> Outcome {
+        self.make_folder()?;
+        self.check()?;
+        let mark = self.mark();
+        let file = Unfinished::beside(&self.path).map_err(|e| self.unwritten(e))?;
+        write(file.path(), mark.as_deref())?;
+        self.settle(file, mark.as_deref())
+    }
+
+    /// Gives the file its name. A file that appeared there since the check is refused as it would have been then.
+    fn settle(&self, file: Unfinished, mark: Option<&str>) -> Outcome {
+        if self.force || self.is_ours(mark) {
+            return file.replace().map_err(|e| self.unwritten(e));
+        }
+        file.create().map_err(|e| match e.kind() {
+            io::ErrorKind::AlreadyExists => self.refused(),
+            _ => self.unwritten(e),
+        })
+    }
+
+    fn make_folder(&self) -> Outcome {
+        let folder = self.path.parent().filter(|f| !f.as_os_str().is_empty());
+        match folder {
+            Some(folder) => make_folder(folder),
+            None => Ok(()),
+        }
+    }
+
+    fn mark(&self) -> Option<String> {
+        self.maker.mark(&self.path)
+    }
+
+    /// Whether what is there says that the same command made it.
+    fn is_ours(&self, mark: Option<&str>) -> bool {
+        mark.is_some_and(|mark| self.form.is_marked_with(&self.path, mark))
+    }
+
+    /// Refuses a name that says the file is something else.
+    fn check_name(&self) -> Outcome {
+        let (path, extension) = (&self.path, self.form.extension());
+        if path.is_dir() {
+            let flag = self.flag_in_ticks();
+            let remedy = format!("name a file in it with {flag}, such as `NAME.{extension}`");
+            return Err(Failure::input(path, "this is a folder").with_remedy(remedy));
+        }
+        if locate::has_extension(path, extension) {
+            return Ok(());
+        }
+        let cause = match is_taken(path) {
+            true => format!("this exists already and is not a `.{extension}` file"),
+            false => format!("{} is written as a `.{extension}` file", self.form.what()),
+        };
+        let remedy = format!("end the name of {} in `.{extension}`", self.flag_in_ticks());
+        Err(Failure::input(path, cause).with_remedy(remedy))
+    }
+
+    fn spare_inputs(&self) -> Outcome {
+        let own = self.path.canonicalize();
+        let is_own =
+            |input: &Path| matches!((&own, input.canonicalize()), (Ok(a), Ok(b)) if *a == b);
+        match self.maker.inputs().any(is_own) {
+            true => Err(Failure::input(&self.path, "this is the input itself")
+                .with_remedy(self.elsewhere())),
+            false => Ok(()),
+        }
+    }
+
+    fn refused(&self) -> Failure {
+        let what = match self.maker.first() {
+            Some(input) => format!("what the same command made from `{}`", input.display()),
+            None => "what the same command made".to_owned(),
+        };
+        let cause = format!("this exists already, and it is not {what}");
+        let remedy = format!("{}, or replace this one with `--force`", self.elsewhere());
+        Failure::input(&self.path, cause).with_remedy(remedy)
+    }
+
+    fn unwritten(&self, cause: io::Error) -> Failure {
+        Failure::write(&self.path, cause)
+    }
+
+    fn elsewhere(&self) -> String {
+        format!("write to another file with {}", self.flag_in_ticks())
+    }
+
+    fn flag_in_ticks(&self) -> String {
+        format!("`{}`", self.flag)
+    }
+}
+
+/// Whether anything has this name, be it a link that leads nowhere.
+fn is_taken(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
+/// Makes a folder for results, and those that it is in.
+pub fn make_folder(folder: &Path) -> Outcome {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))
+}
+
+/// Path of a result: the file that `--out` names, or `NAME.EXTENSION` in the folder that it names, or in this folder.
+pub fn result_path(out: Option<&Path>, name: &str, form: Form) -> PathBuf {
+    let file = format!("{}.{}", safe_name(name), form.extension());
+    match out {
+        Some(out) if names_folder(out) => out.join(file),
+        Some(out) => out.to_path_buf(),
+        None => PathBuf::from(file),
+    }
+}
+
+/// Whether `--out` means a folder: one that exists, or a path that ends in a slash.
+pub fn names_folder(out: &Path) -> bool {
+    out.is_dir() || out.as_os_str().to_string_lossy().ends_with('/')
+}
+
+/// A name from a file, such as that of a take, as a file name that every system takes.
+pub fn safe_name(name: &str) -> String {
+    let clean = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
+    let name: String = name.chars().map(clean).collect();
+    let name = name.trim_matches(['-', '.']);
+    if name.is_empty() {
+        "clip".into()
+    } else {
+        name.into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_file_names() {
+        assert_eq!(safe_name("mixamo.com|Take 001"), "mixamo.com-Take-001");
+        assert_eq!(safe_name("../../x"), "x");
+        assert_eq!(safe_name("…/"), "clip");
+    }
+
+    #[test]
+    fn out_is_a_file_or_a_folder() {
+        let path = |out: &str| result_path(Some(Path::new(out)), "kick", Form::Clip);
+        assert_eq!(path("a/b.clip"), Path::new("a/b.clip"));
+        assert_eq!(path("a/"), Path::new("a/kick.clip"));
+        let here = result_path(None, "kick", Form::Clip);
+        assert_eq!(here, Path::new("kick.clip"));
+    }
+}
