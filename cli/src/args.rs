@@ -163,11 +163,26 @@ fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
     Ok((slot, weight))
 }
 
+/// Most of anything that is counted on the command line, and most threads. Chosen: far above any use; a system that is asked
+/// for 100,000 threads stands still.
+const MOST: usize = 1_000_000;
+const MOST_THREADS: usize = 1024;
+
 /// A whole number from 1.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
-    match whole(text)? {
-        0 => Err("must be at least 1".into()),
-        number => usize::try_from(number).map_err(|_| "too large".into()),
+    from_one_to(MOST, text)
+}
+
+/// A number of threads.
+pub fn threads(text: &str) -> Result<usize, String> {
+    from_one_to(MOST_THREADS, text)
+}
+
+fn from_one_to(most: usize, text: &str) -> Result<usize, String> {
+    let number = usize::try_from(whole(text)?).unwrap_or(usize::MAX);
+    match (1..=most).contains(&number) {
+        true => Ok(number),
+        false => Err(format!("must be from 1 to {most}")),
     }
 }
 
@@ -275,6 +290,16 @@ mod tests {
     }
 
     #[test]
+    fn counts_are_bounded() {
+        assert_eq!(threads("2"), Ok(2));
+        assert_eq!(at_least_one("1000000"), Ok(1_000_000));
+        for wrong in ["0", "1025", "100000", "18446744073709551615"] {
+            let said = threads(wrong);
+            assert_eq!(said, Err("must be from 1 to 1024".to_owned()), "{wrong}");
+        }
+    }
+
+    #[test]
     fn whole_numbers_say_what_is_wrong_with_others() {
         assert_eq!(whole("18446744073709551615"), Ok(u64::MAX));
         for (text, reason) in [
@@ -288,7 +313,10 @@ mod tests {
             let said = whole(text).expect_err(text);
             assert!(said.contains(reason), "{text}: {said}");
         }
-        assert_eq!(at_least_one("0"), Err("must be at least 1".to_owned()));
+        assert_eq!(
+            at_least_one("0"),
+            Err("must be from 1 to 1000000".to_owned())
+        );
     }
 
     #[test]

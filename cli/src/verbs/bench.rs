@@ -1,6 +1,5 @@
 //! `mimic bench`: measures how fast this machine is at every stage of the work.
 
-use crate::args::at_least_one;
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::runs;
@@ -43,7 +42,7 @@ pub struct Args {
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,
     /// Number of threads [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = crate::args::threads, allow_negative_numbers = true)]
     threads: Option<usize>,
 }
 

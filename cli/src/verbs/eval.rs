@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long)]
     perturb: bool,
     /// Number of threads; the result does not depend on it [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = crate::args::threads, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// Write the result to FILE, as JSON [default: the run's eval.json, if episodes and seconds have their defaults]
     #[arg(long, short, value_name = "FILE")]

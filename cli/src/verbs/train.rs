@@ -7,7 +7,7 @@ mod resume;
 mod setting;
 mod stop;
 
-use crate::args::{ImportArgs, RetargetArgs, at_least_one, samples, whole};
+use crate::args::{ImportArgs, RetargetArgs, samples, whole};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::prepare::{Preparation, Prepared};
@@ -85,7 +85,7 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Number of threads; the result does not depend on it [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = crate::args::threads, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// Continue a run that was stopped
     #[arg(

@@ -244,6 +244,7 @@ impl ImitationSettings {
     /// The first that isn't.
     pub fn check(&self) -> Result<(), TaskError> {
         schema::check(self, "task")?;
+        self.physics.check()?;
         self.rewards.check()
     }
 }

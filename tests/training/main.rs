@@ -1,5 +1,7 @@
 //! A run learns the same bits at any number of threads, and after being killed and resumed.
 
+mod extremes;
+
 use mimic::clip::LoopMode;
 use mimic::import;
 use mimic::learn::{PpoConfig, Trainer};
