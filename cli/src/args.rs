@@ -1,6 +1,7 @@
 //! Arguments that several verbs share, and how their values are read.
 
 use crate::failure::{Failure, Outcome};
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, ValueEnum};
 use mimic::clip::LoopMode;
 use mimic::humanoid::Slot;
@@ -36,7 +37,7 @@ pub struct Replace {
 #[command(next_help_heading = "Import options")]
 pub struct ImportArgs {
     /// Take to read, by name or by number from 1; `mimic import` also accepts `all` [default: the take with most motion]
-    #[arg(long, value_name = "TAKE")]
+    #[arg(long, value_name = "TAKE", value_parser = NonEmptyStringValueParser::new())]
     take: Option<String>,
     /// Frames per second to sample at; below 27, a motion is sampled at a multiple of it [default: the take's own rate]
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
@@ -111,7 +112,7 @@ impl ImportArgs {
 #[command(next_help_heading = "Retarget options")]
 pub struct RetargetArgs {
     /// Physics character: `humanoid`, `marathon`, `robot` or an MJCF file [default: humanoid; in `train` that of the preset]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_parser = NonEmptyStringValueParser::new())]
     pub skeleton: Option<String>,
     /// Joint map, as written by `mimic info --write-map` [default: found by joint names and rest pose]
     #[arg(long, value_name = "FILE")]
@@ -244,7 +245,9 @@ pub fn span(text: &str) -> Result<(f64, f64), String> {
         .split_once("..")
         .ok_or("give seconds as A..B, e.g. 0.5..2")?;
     let (from, to) = (seconds(from, 0.0)?, seconds(to, f64::INFINITY)?);
-    if from >= 0.0 && from < to {
+    if from < 0.0 {
+        Err(format!("`{from}` is before the start"))
+    } else if from < to {
         Ok((from, to))
     } else {
         Err("the end must come after the start".into())

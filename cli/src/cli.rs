@@ -4,6 +4,7 @@ use crate::args::Talk;
 use crate::failure::Failure;
 use crate::printer;
 use crate::verbs::Verb;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Command, CommandFactory, Parser};
 use std::ffi::OsString;
@@ -26,6 +27,17 @@ folder or in runs/. Without an input, commands use the newest file or run.
 Results go to standard output, messages to standard error. Exit codes: 0 success, 1 the work failed, \
 2 wrong usage or input.";
 
+/// The library folder if none is given.
+pub const LIBRARY: &str = "clips";
+
+/// The folder of an empty variable is the usual one: an empty variable is as good as none.
+fn library(given: OsString) -> PathBuf {
+    match given.is_empty() {
+        true => LIBRARY.into(),
+        false => given.into(),
+    }
+}
+
 /// Turn animation clips into physics characters that perform them
 #[derive(Parser)]
 #[command(name = "mimic", version, after_help = EXAMPLES, max_term_width = 100)]
@@ -40,7 +52,8 @@ pub struct Cli {
         global = true,
         value_name = "DIR",
         env = "MIMIC_LIBRARY",
-        default_value = "clips",
+        default_value = LIBRARY,
+        value_parser = OsStringValueParser::new().map(library),
         help_heading = "Global options"
     )]
     pub library: PathBuf,

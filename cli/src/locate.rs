@@ -3,6 +3,7 @@
 use crate::failure::{Failure, Outcome};
 use mimic::run::files;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -27,11 +28,10 @@ const NAMES_SHOWN: usize = 8;
 
 /// The file that `wanted` means: a path, or a name in the library with one of `extensions`, the first before the others.
 pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathBuf> {
-    if wanted.is_file() {
+    let is_there = is_there(wanted)?;
+    // A pipe or a device is refused by who reads it, with its kind.
+    if is_there && !wanted.is_dir() {
         return Ok(wanted.to_path_buf());
-    }
-    if wanted.is_dir() && !is_name(wanted) {
-        return Err(Failure::input(wanted, "this is a folder").with_remedy("name a file in it"));
     }
     if is_name(wanted) {
         let whole = Some(library.join(wanted)).filter(|path| path.is_file());
@@ -39,7 +39,38 @@ pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathB
             return Ok(found);
         }
     }
-    Err(absent(wanted, library, extensions))
+    Err(match is_there {
+        true => folder(wanted),
+        false => absent(wanted, library, extensions),
+    })
+}
+
+/// Whether there is anything of this name. What we may not look at is there, but can't be read.
+fn is_there(path: &Path) -> Outcome<bool> {
+    match fs::metadata(path) {
+        Ok(_) => Ok(true),
+        Err(e) if is_absence(&e) => Ok(false),
+        Err(e) => Err(Failure::unreadable(path, &e)),
+    }
+}
+
+/// Whether the system says that there is nothing: no such name, or a file where the path has a folder.
+fn is_absence(error: &io::Error) -> bool {
+    let kinds = [io::ErrorKind::NotFound, io::ErrorKind::NotADirectory];
+    kinds.contains(&error.kind())
+}
+
+/// The failure of a command that was given a folder for a file.
+fn folder(wanted: &Path) -> Failure {
+    let name = wanted.display();
+    let (cause, remedy) = match is_run(wanted) {
+        true => (
+            "this is the folder of a run, and the command takes a clip or a motion",
+            format!("use the run with `mimic replay {name}` or `mimic eval {name}`"),
+        ),
+        false => ("this is a folder", "name a file in it".to_owned()),
+    };
+    Failure::input(wanted, cause).with_remedy(remedy)
 }
 
 /// The same for commands that work on clips, and on what clips are made of.
@@ -87,7 +118,13 @@ pub fn file_or_newest(
 /// The folder of the run that `wanted` means: a path, or a name in `runs/`. Left out, the newest run.
 pub fn run(wanted: Option<&Path>) -> Outcome<PathBuf> {
     match wanted {
-        Some(wanted) => existing_run(wanted).ok_or_else(|| absent_run(wanted)),
+        Some(wanted) => match existing_run(wanted) {
+            Some(run) => Ok(run),
+            None => {
+                is_there(&wanted.join(files::CONFIG))?;
+                Err(absent_run(wanted))
+            }
+        },
         None => newest_run().ok_or_else(|| {
             Failure::user(format!("there is no run in `{RUNS}/`"))
                 .with_remedy("make one with `mimic train CLIP`")

@@ -1,8 +1,13 @@
 //! The rerun viewer, a program of its own: finding, starting and reaching it.
 
+mod place;
+
+pub use place::Bind;
+
 use crate::failure::{Failure, Outcome};
+use place::answers;
 use std::fmt::Display;
-use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -12,11 +17,13 @@ use std::time::{Duration, Instant};
 /// Version of the recordings that we write. A viewer reads recordings of its own version best.
 pub const VERSION: &str = "0.36.3";
 
-/// Where a viewer listens unless told otherwise: this machine, and rerun's own default port.
-const PLACE: ([u8; 4], u16) = ([127, 0, 0, 1], 9876);
+/// Where a viewer listens for recordings unless told otherwise: rerun's own default port.
+const PORT: u16 = 9876;
+/// The same for the page that web browsers open.
+const PAGE: u16 = 9090;
 
-/// How long a viewer may take to answer. Chosen: a network round trip takes well below a second.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Time between two looks at a viewer.
+const PAUSE: Duration = Duration::from_millis(100);
 /// How long a viewer may take to start. Chosen: a first start on a busy machine takes several seconds.
 const START: Duration = Duration::from_secs(15);
 
@@ -59,65 +66,115 @@ impl Viewer {
     }
 
     /// Opens a window that stays open after this program ends, or finds one that is open already. Returns its address.
-    pub fn open(&self) -> Outcome<String> {
-        let place = SocketAddr::from(PLACE);
-        if !answers(place) {
-            let mut viewer = self.start(place.port())?;
-            self.await_answer(place, &mut viewer)?;
+    pub fn open(&self, bind: &Bind) -> Outcome<String> {
+        let usual = bind.port.unwrap_or(PORT);
+        let place = bind.place(usual);
+        if !place::is_viewer(place::reachable(place)) {
+            let port = bind.free_port(usual)?;
+            let place = bind.place(port);
+            let mut window = self.command(bind);
+            window
+                .arg(format!("--port={port}"))
+                .args(["--expect-data-soon", "--hide-welcome-screen"]);
+            let mut viewer = self.start(window)?;
+            // The program that was started may be a launcher, which ends well before the window.
+            self.await_answers(&[place], &mut viewer, |status| !status.success())?;
+            return Ok(address(&place::reachable(place).to_string()));
         }
-        Ok(address(&place.to_string()))
+        Ok(address(&place::reachable(place).to_string()))
     }
 
-    /// Starts the viewer with its streams closed: a program that reads ours would otherwise wait for the viewer's end.
-    fn start(&self, port: u16) -> Outcome<Child> {
+    /// Serves a recording to web browsers until it is stopped. `ready` gets the address once it can be opened.
+    pub fn serve(
+        &self,
+        recording: &Path,
+        bind: &Bind,
+        ready: impl FnOnce(&str) -> Outcome,
+    ) -> Outcome {
+        let stopped = Arc::new(AtomicBool::new(false));
+        let flag = stopped.clone();
+        // We stay to end the viewer and to remove the temporary file.
+        ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).ok();
+        let page = match bind.port {
+            Some(port) => bind.free_port(port)?,
+            None => bind.free_port(PAGE)?,
+        };
+        let data = Bind {
+            port: None,
+            ..*bind
+        }
+        .free_port_but(PORT, page)?;
+        let mut command = self.command(bind);
+        command
+            .arg("--serve-web")
+            .arg(format!("--port={data}"))
+            .arg(format!("--web-viewer-port={page}"))
+            .arg(recording);
+        if let Some(origin) = bind.origin(page) {
+            command.arg(format!("--cors-allow-origin={origin}"));
+        }
+        let mut viewer = self.start(command)?;
+        let places = [bind.place(page), bind.place(data)];
+        let served = self
+            .await_answers(&places, &mut viewer, |_| true)
+            .and_then(|()| ready(&bind.page_address(page, data)))
+            .and_then(|()| self.outlast(&mut viewer, &stopped).map_err(Failure::partly));
+        end(&mut viewer);
+        served
+    }
+
+    /// The viewer, listening where it is told to, with its streams closed: what it says isn't our result, and a program that
+    /// reads ours would otherwise wait for the viewer's end.
+    fn command(&self, bind: &Bind) -> Command {
         let mut command = Command::new(&self.path);
         command
-            .arg(format!("--port={port}"))
-            .args(["--expect-data-soon", "--hide-welcome-screen"])
+            .arg(format!("--bind={}", bind.ip))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null());
-        // In a process group of its own, so that a Ctrl-C for this program leaves the window open.
+        // In a process group of its own: a Ctrl-C for this program leaves its window open, and what is served ends as a
+        // whole, although the program that was started may be a launcher.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command
+    }
+
+    fn start(&self, mut command: Command) -> Outcome<Child> {
         command.spawn().map_err(|e| self.broken(e))
     }
 
-    /// Waits until the viewer listens. The program that was started may be a launcher, which ends well before that.
-    fn await_answer(&self, place: SocketAddr, viewer: &mut Child) -> Outcome {
+    /// Waits until the viewer listens everywhere, or ends in a way that `fails`.
+    fn await_answers(
+        &self,
+        places: &[SocketAddr],
+        viewer: &mut Child,
+        fails: impl Fn(ExitStatus) -> bool,
+    ) -> Outcome {
         let begun = Instant::now();
         while begun.elapsed() < START {
-            if answers(place) {
+            if places.iter().all(|place| answers(place::reachable(*place))) {
                 return Ok(());
             }
             let ended = viewer.try_wait().map_err(|e| self.broken(e))?;
-            if let Some(status) = ended.filter(|status| !status.success()) {
+            if let Some(status) = ended.filter(|status| fails(*status)) {
                 return Err(self.ended(status));
             }
-            std::thread::sleep(Duration::from_millis(100));
+            std::thread::sleep(PAUSE);
         }
-        let seconds = START.as_secs();
+        let (seconds, place) = (START.as_secs(), places[0]);
         Err(self.broken(format!("it does not listen at `{place}` after {seconds} s")))
     }
 
-    /// Serves a recording to web browsers until it is stopped. What the viewer prints goes to standard error, so that
-    /// standard output holds nothing but our result.
-    pub fn serve(&self, recording: &Path) -> Outcome {
-        let stopped = Arc::new(AtomicBool::new(false));
-        let flag = stopped.clone();
-        // Ctrl-C reaches both programs. It ends the viewer; we stay to remove the temporary file.
-        ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).ok();
-        let mut command = Command::new(&self.path);
-        command
-            .arg("--serve-web")
-            .arg(recording)
-            .stdin(Stdio::null())
-            .stdout(std::io::stderr());
-        let status = command.status().map_err(|e| self.broken(e))?;
-        if status.success() || interrupted(status) || stopped.load(Ordering::Relaxed) {
-            return Ok(());
+    /// Waits until the viewer ends, or until this program is asked to.
+    fn outlast(&self, viewer: &mut Child, stopped: &AtomicBool) -> Outcome {
+        while !stopped.load(Ordering::Relaxed) {
+            match viewer.try_wait().map_err(|e| self.broken(e))? {
+                Some(status) if status.success() => return Ok(()),
+                Some(status) => return Err(self.ended(status)),
+                None => std::thread::sleep(PAUSE),
+            }
         }
-        Err(self.ended(status))
+        Ok(())
     }
 
     fn ended(&self, status: ExitStatus) -> Failure {
@@ -136,21 +193,28 @@ impl Viewer {
     }
 }
 
-fn answers(place: SocketAddr) -> bool {
-    TcpStream::connect_timeout(&place, PATIENCE).is_ok()
-}
-
-/// Whether a program was ended by Ctrl-C. Our own handler may not have run yet.
+/// Ends a viewer and all that it started.
 #[cfg(unix)]
-fn interrupted(status: ExitStatus) -> bool {
-    const SIGINT: i32 = 2;
-    let signal = std::os::unix::process::ExitStatusExt::signal(&status);
-    signal == Some(SIGINT) || status.code() == Some(128 + SIGINT)
+#[allow(
+    unsafe_code,
+    reason = "no safe interface sends a signal to a process group"
+)]
+fn end(viewer: &mut Child) {
+    if let Ok(group) = i32::try_from(viewer.id()) {
+        // SAFETY: sending a signal touches no memory of ours. The group has the number of its first process, which we
+        // started and which has that number at least until it is waited for; later none of that number is left, or it is
+        // the rest of the group.
+        unsafe {
+            libc::kill(-group, libc::SIGTERM);
+        }
+    }
+    viewer.wait().ok();
 }
 
 #[cfg(not(unix))]
-fn interrupted(_: ExitStatus) -> bool {
-    false
+fn end(viewer: &mut Child) {
+    viewer.kill().ok();
+    viewer.wait().ok();
 }
 
 /// Address of a viewer that listens at `host:port`. A whole address stays as it is.
@@ -200,6 +264,6 @@ mod tests {
 
     #[test]
     fn the_default_port_is_that_of_rerun() {
-        assert_eq!(PLACE.1, rerun::DEFAULT_SERVER_PORT);
+        assert_eq!(PORT, rerun::DEFAULT_SERVER_PORT);
     }
 }

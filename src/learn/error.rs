@@ -81,7 +81,7 @@ impl Explain for LearnError {
                 "lower the learning rate, or look for rewards and observations that are not finite",
             ),
             Self::Network { found, expected } => Explanation::input(format!(
-                "the saved state is for the network {found}, not {expected}"
+                "the saved state is for a network {found}; this one is {expected}"
             ))
             .remedy("train into a new folder, or use the saved configuration"),
         }

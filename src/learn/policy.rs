@@ -8,6 +8,8 @@ use crate::schema::OutOfRange;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::fmt;
 use std::ops::Range;
 
 /// The shape of a policy: all that its parameter vector's layout depends on.
@@ -22,6 +24,24 @@ pub struct PolicySpec {
     /// What follows every hidden layer.
     #[serde(default)]
     pub activation: Activation,
+}
+
+impl fmt::Display for PolicySpec {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self {
+            observation,
+            action,
+            hidden,
+            activation,
+        } = self;
+        let widths: Vec<String> = hidden.iter().map(usize::to_string).collect();
+        let (widths, activation) = (widths.join(", "), json!(activation));
+        let activation = activation.as_str().unwrap_or_default();
+        write!(
+            f,
+            "of {observation} observations, hidden layers of {widths} ({activation}), and {action} actions"
+        )
+    }
 }
 
 /// A piece of the parameter vector with a name and a shape.

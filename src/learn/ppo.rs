@@ -82,10 +82,7 @@ impl<T: Scalar> Learner<T> {
     /// A state of another network, or of vectors that don't fit it; the learner is then unchanged.
     pub fn restore(&mut self, state: LearnerState<T>) -> Result<(), LearnError> {
         if &state.spec != self.policy.spec() {
-            let (found, expected) = (
-                format!("{:?}", state.spec),
-                format!("{:?}", self.policy.spec()),
-            );
+            let (found, expected) = (state.spec.to_string(), self.policy.spec().to_string());
             return Err(LearnError::Network { found, expected });
         }
         let count = self.policy.parameter_count();

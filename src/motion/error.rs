@@ -28,9 +28,14 @@ impl Explain for MotionError {
                 motion,
                 made_for,
                 skeleton,
-            } => Explanation::input(format!(
-                "motion `{motion}` was made for skeleton `{made_for}`, which differs from `{skeleton}`"
-            ))
+            } => Explanation::input(match made_for == skeleton {
+                true => format!(
+                    "motion `{motion}` was made for another skeleton that is called `{skeleton}` too, or for this one before it changed"
+                ),
+                false => {
+                    format!("motion `{motion}` was made for skeleton `{made_for}`, not for `{skeleton}`")
+                }
+            })
             .remedy_by(
                 Parameter::Skeleton,
                 "use that skeleton, or retarget the clip again",

@@ -8,7 +8,8 @@ use crate::prepare::Preparation;
 use crate::printer::Printer;
 use crate::recording::{self, Recording, Sink};
 use crate::runs;
-use crate::viewer::{self, Viewer};
+use crate::viewer::{self, Bind, Viewer};
+use clap::builder::NonEmptyStringValueParser;
 use mimic::evaluate::Options;
 use mimic::explain::plain;
 use mimic::task::{EpisodeStart, StartState};
@@ -22,6 +23,8 @@ Examples:
   mimic replay kick --rerun --phase 0.44     start where `mimic eval` reports a fall
   mimic replay walk --rerun --perturb        disturb the agent by shoves
   mimic replay walk.fbx --save walk.rrd      record a clip; `rerun walk.rrd` opens it
+  mimic replay kick --serve                  watch it in a web browser on this machine
+  mimic replay kick --serve --bind 0.0.0.0   let browsers on other machines in, too
   mimic replay kick --connect 127.0.0.1:9876
   mimic replay walk-and-run --rerun --sequence walk,run,walk
                                              go from one motion to the next";
@@ -99,7 +102,6 @@ pub struct Args {
 
 /// Where the recording goes: one or several places.
 #[derive(clap::Args)]
-#[group(required = true, multiple = true)]
 struct Sinks {
     /// Open it in the viewer
     #[arg(long)]
@@ -108,17 +110,22 @@ struct Sinks {
     #[arg(long, value_name = "FILE.rrd")]
     save: Option<PathBuf>,
     /// Send it to a running viewer, e.g. at 127.0.0.1:9876
-    #[arg(long, value_name = "ADDR")]
+    #[arg(long, value_name = "ADDR", value_parser = NonEmptyStringValueParser::new())]
     connect: Option<String>,
     /// Serve it to web browsers until Ctrl-C
     #[arg(long)]
     serve: bool,
+    /// Address at which the viewer of `--serve` or `--rerun` listens, with a port if it has to be a certain one: 0.0.0.0 lets
+    /// other machines in [default: 127.0.0.1, which is this machine alone]
+    #[arg(long, value_name = "ADDR[:PORT]")]
+    bind: Option<Bind>,
 }
 
 impl Args {
     /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         recording::require()?;
+        self.sinks.check()?;
         let viewer = (self.sinks.rerun || self.sinks.serve)
             .then(Viewer::require)
             .transpose()?;
@@ -141,9 +148,26 @@ impl Args {
         self.sinks
             .show(&shown, output.as_ref(), viewer.as_ref(), printer)?;
         let saved = output.as_ref().map(Output::path);
+        match viewer.filter(|_| self.sinks.serve) {
+            Some(viewer) => serve(&shown, &viewer, &self.sinks.bind(), |address| {
+                self.report(&shown, saved, Some(address), printer)
+            }),
+            None => self.report(&shown, saved, None, printer),
+        }
+    }
+
+    /// Prints what was shown, and at which `address` it is served.
+    fn report(
+        &self,
+        shown: &Recording,
+        saved: Option<&Path>,
+        address: Option<&str>,
+        printer: &Printer,
+    ) -> Outcome {
         let json = json!({
             "name": shown.name,
             "recording": saved.map(|path| path.display().to_string()),
+            "address": address,
             "frames": shown.frames(),
             "fps": shown.fps,
             "agent": shown.agent.is_some(),
@@ -151,7 +175,10 @@ impl Args {
             "shoves": shown.shoves,
             "failed_s": shown.failed_s,
         });
-        printer.result(&json, || summary(&shown, saved, self.perturb))
+        printer.result(&json, || {
+            let served = address.map(|a| format!("\nopen {a} in a browser; Ctrl-C ends it"));
+            summary(shown, saved, self.perturb) + &served.unwrap_or_default()
+        })
     }
 }
 
@@ -294,12 +321,27 @@ impl Sinks {
             ));
         }
         if self.rerun {
-            send(shown, viewer.open()?)?;
-        }
-        if self.serve {
-            serve(shown, viewer)?;
+            send(shown, viewer.open(&self.bind())?)?;
         }
         Ok(())
+    }
+
+    /// Refuses a replay that nobody would see, and an address at which nothing listens.
+    fn check(&self) -> Outcome {
+        if !(self.rerun || self.serve || self.connect.is_some() || self.save.is_some()) {
+            return Err(Failure::user("it is not said where to show the replay").with_remedy(
+                "open it in the viewer with `--rerun`, in a browser with `--serve`, or write it to a file with `--save FILE.rrd`",
+            ));
+        }
+        if self.bind.is_some() && !(self.rerun || self.serve) {
+            let cause = "`--bind` is for the viewer that `--serve` or `--rerun` starts";
+            return Err(Failure::user(cause).with_remedy("give one of the two, or leave it out"));
+        }
+        Ok(())
+    }
+
+    fn bind(&self) -> Bind {
+        self.bind.unwrap_or_default()
     }
 }
 
@@ -312,11 +354,17 @@ fn send(shown: &Recording, address: String) -> Outcome {
     recording::write(shown, &Sink::Viewer(address.clone())).map_err(failed)
 }
 
-fn serve(shown: &Recording, viewer: &Viewer) -> Outcome {
+/// Serves it from a temporary file until Ctrl-C. `ready` gets the address.
+fn serve(
+    shown: &Recording,
+    viewer: &Viewer,
+    bind: &Bind,
+    ready: impl FnOnce(&str) -> Outcome,
+) -> Outcome {
     let failed = |e| Failure::write(&std::env::temp_dir(), e);
     let mut builder = tempfile::Builder::new();
     let file = builder.prefix("mimic-").suffix(".rrd").tempfile();
     let file = file.map_err(failed)?;
     recording::write_file(shown, file.path(), file.path(), None)?;
-    viewer.serve(file.path())
+    viewer.serve(file.path(), bind, ready)
 }

@@ -91,6 +91,115 @@ fn errors_are_json_too() {
     assert!(error["file"].is_null() && error["place"].is_null());
 }
 
+/// Each number that can't be is refused with the reason, in one line, before any work.
+#[test]
+fn numbers_that_can_not_be_are_told_why() {
+    let bench = Workbench::with_clip();
+    for (line, reason) in [
+        (
+            &["train", "sway.txt", "--seed", "-1"][..],
+            "must not be negative",
+        ),
+        (
+            &["train", "sway.txt", "--seed", "1.5"],
+            "not a whole number",
+        ),
+        (
+            &["train", "sway.txt", "--samples", "1e30"],
+            "must be at most 1e15",
+        ),
+        (
+            &["train", "sway.txt", "--samples", "1.5"],
+            "not a whole number",
+        ),
+        (
+            &["train", "sway.txt", "--samples", "0"],
+            "must be at least 1",
+        ),
+        (
+            &["train", "sway.txt", "--samples", "-3"],
+            "must be at least 1",
+        ),
+        (
+            &["train", "sway.txt", "--minutes", "-3"],
+            "must be greater than 0",
+        ),
+        (
+            &["import", "sway.txt", "--fps", "-3"],
+            "must be greater than 0",
+        ),
+        (
+            &["import", "sway.txt", "--trim", "-1..2"],
+            "`-1` is before the start",
+        ),
+        (
+            &["import", "sway.txt", "--trim", "2..1"],
+            "the end must come after the start",
+        ),
+        (
+            &["import", "sway.txt", "--take", ""],
+            "a value is required for '--take <TAKE>'",
+        ),
+        (
+            &["import", "sway.txt", "--out", ""],
+            "a value is required for '--out <PATH>'",
+        ),
+        (
+            &["edit", "sway.txt", "--speed", "-2"],
+            "must be greater than 0",
+        ),
+        (
+            &["edit", "sway.txt", "sway.txt", "--blend", "-2"],
+            "must not be negative",
+        ),
+        (&["plot", "--smooth", "-2"], "must not be negative"),
+        (&["eval", "--episodes", "0"], "must be from 1 to"),
+        (
+            &["replay", "sway.txt", "--motion", "-2"],
+            "must not be negative",
+        ),
+    ] {
+        let said = bench.complaint(line, 2);
+        assert!(said.contains(reason), "{line:?}: {said}");
+        assert!(said.contains("; "), "a remedy: {said}");
+        bench.error(line, 2);
+    }
+}
+
+#[test]
+fn an_empty_variable_is_as_good_as_none() {
+    let bench = Workbench::with_clip();
+    std::fs::create_dir(bench.path("clips")).expect("a folder can be made");
+    std::fs::rename(bench.path("sway.txt"), bench.path("clips/sway.txt")).expect("moved");
+    let mut info = bench.mimic(&["info", "sway"]);
+    info.env("MIMIC_LIBRARY", "").assert().success();
+}
+
+/// A folder and a file that may not be read are there, whatever the command had hoped for.
+#[test]
+fn what_is_there_is_not_called_missing() {
+    let bench = Workbench::with_run();
+    for folder in ["shelf", "runs"] {
+        std::fs::create_dir_all(bench.path(folder)).expect("a folder can be made");
+        let error = bench.error_about(folder, &["info", folder], 2);
+        assert!(
+            error["message"]
+                .as_str()
+                .is_some_and(|m| m.contains("this is a folder"))
+        );
+    }
+    let said = bench.complaint(&["info", "runs/sway"], 2);
+    assert!(
+        said.contains("this is the folder of a run") && said.contains("`mimic replay runs/sway`"),
+        "{said}"
+    );
+    // A name of a file that goes on after the file, and one that no system takes.
+    bench.error_about("sway.txt/deep.fbx", &["info", "sway.txt/deep.fbx"], 2);
+    let long = format!("{}.fbx", "x".repeat(300));
+    let said = bench.complaint(&["info", &long], 2);
+    assert!(said.contains("cannot be read"), "{said}");
+}
+
 #[test]
 fn what_is_not_there_is_named() {
     let bench = Workbench::new();

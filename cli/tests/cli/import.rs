@@ -4,7 +4,7 @@ use crate::workbench::Workbench;
 use serde_json::{Value, json};
 
 /// A glTF file with the takes `up`, a second long, and `down`, two seconds: a hip that rises and sinks.
-fn with_two_takes() -> Workbench {
+pub fn with_two_takes() -> Workbench {
     let bench = Workbench::new();
     let floats = [0.0_f32, 1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let bytes: Vec<u8> = floats.iter().flat_map(|x| x.to_le_bytes()).collect();
@@ -127,6 +127,11 @@ fn of_several_files_the_failed_are_listed() {
     assert_eq!(report["clips"][0]["clip"], "sway.clip");
     assert_eq!(report["failures"][0]["file"], "empty.fbx");
     assert_eq!(report["failures"][0]["exit"], 2);
+    let message = report["failures"][0]["message"].as_str();
+    assert!(
+        message.is_some_and(|m| m.contains("an empty file")),
+        "{report}"
+    );
     assert!(report["failures"][0]["remedy"].is_string(), "{report}");
     let message = report["error"]["message"].as_str();
     assert!(message.is_some_and(|m| m.contains("1 of 2")), "{report}");
@@ -142,8 +147,9 @@ fn our_own_files_are_sent_where_they_belong() {
     bench.mimic(&["retarget", "sway.txt"]).assert().success();
     for verb in ["info", "import"] {
         let error = bench.error_about("sway.motion", &[verb, "sway.motion"], 2);
-        let remedy = error["remedy"].as_str().unwrap_or_default();
-        assert!(remedy.contains("`mimic tracks`"), "{error}");
+        let said = |part: &str| error[part].as_str().unwrap_or_default().to_owned();
+        assert!(said("message").contains("this is a motion"), "{error}");
+        assert!(said("remedy").contains("`mimic tracks`"), "{error}");
     }
 }
 

@@ -11,6 +11,8 @@ mod output;
 mod readme;
 #[cfg(feature = "rerun")]
 mod replay;
+mod shown;
+mod spared;
 mod stages;
 mod talk;
 mod training;

@@ -240,37 +240,240 @@ fn with_viewer(script: &str) -> Workbench {
     bench
 }
 
+/// `mimic replay sway.txt`, which finds that viewer.
 #[cfg(unix)]
-#[test]
-fn a_viewer_that_fails_is_failed_work() {
-    let bench = with_viewer("echo noise; exit 3");
-    for sink in ["--serve", "--rerun"] {
-        let mut command = bench.mimic(&["replay", "sway.txt", sink]);
-        let path = format!("{}:/usr/bin:/bin", bench.path(".").display());
-        let output = command.env("PATH", path).assert().code(1);
-        let output = output.get_output();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(
-            said.contains("exit status: 3") && said.contains("--save"),
-            "{said}"
-        );
-        assert!(output.stdout.is_empty(), "the viewer's talk is no result");
-    }
+fn replay(bench: &Workbench, line: &[&str]) -> std::process::Command {
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("mimic"));
+    let path = format!("{}:/usr/bin:/bin", bench.path(".").display());
+    command
+        .args(["replay", "sway.txt"])
+        .args(line)
+        .current_dir(bench.path("."))
+        .env("PATH", path)
+        .env("TMPDIR", bench.path("tmp"));
+    fs::create_dir_all(bench.path("tmp")).expect("a folder can be made");
+    command
+}
+
+/// A port of this machine at which nobody listens.
+#[cfg(unix)]
+fn free_port() -> u16 {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("there is one");
+    listener.local_addr().expect("it has an address").port()
 }
 
 #[cfg(unix)]
 #[test]
-fn what_was_served_is_gone_afterwards() {
-    let bench = with_viewer("ls \"$2\"");
-    fs::create_dir(bench.path("tmp")).expect("a folder can be made");
-    let mut command = bench.mimic(&["replay", "sway.txt", "--serve", "--json"]);
-    let path = format!("{}:/usr/bin:/bin", bench.path(".").display());
-    let command = command.env("PATH", path).env("TMPDIR", bench.path("tmp"));
-    let output = command.assert().success();
-    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
-    assert!(
-        said.contains("tmp/mimic-") && said.contains(".rrd"),
-        "{said}"
-    );
+fn a_viewer_that_fails_is_failed_work() {
+    let bench = with_viewer("echo noise; echo noise >&2; exit 3");
+    let place = format!("127.0.0.1:{}", free_port());
+    for sink in [&["--serve"][..], &["--rerun", "--bind", &place]] {
+        let output = replay(&bench, sink).output().expect("it runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(
+            said.contains("exit status: 3") && said.contains("--save"),
+            "{said}"
+        );
+        assert!(
+            !said.contains("noise"),
+            "the viewer's talk is its own: {said}"
+        );
+        assert!(output.stdout.is_empty(), "the viewer's talk is no result");
+        assert_eq!(names(&bench, "tmp"), Vec::<String>::new());
+    }
+}
+
+/// A viewer that ends before anybody could look served nothing.
+#[cfg(unix)]
+#[test]
+fn a_viewer_that_ends_at_once_is_failed_work() {
+    let bench = with_viewer("exit 0");
+    let output = replay(&bench, &["--serve"]).output().expect("it runs");
+    assert_eq!(output.status.code(), Some(1));
     assert_eq!(names(&bench, "tmp"), Vec::<String>::new());
+}
+
+/// The value of a flag in what a viewer was started with, once it was.
+#[cfg(unix)]
+fn started_with(bench: &Workbench, flag: &str) -> String {
+    let begun = std::time::Instant::now();
+    while begun.elapsed().as_secs() < 20 {
+        let text = fs::read_to_string(bench.path("arguments")).unwrap_or_default();
+        if let Some(line) = text.lines().find_map(|line| line.strip_prefix(flag)) {
+            return line.to_owned();
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    panic!("no viewer was started with `{flag}`");
+}
+
+/// The first line that a program prints.
+#[cfg(unix)]
+fn first_line(child: &mut std::process::Child) -> String {
+    use std::io::BufRead;
+    let mut line = String::new();
+    let stdout = child.stdout.take().expect("it is piped");
+    let mut lines = std::io::BufReader::new(stdout);
+    lines.read_line(&mut line).expect("it prints");
+    line
+}
+
+#[cfg(unix)]
+fn signal(child: &std::process::Child, name: &str) {
+    let status = std::process::Command::new("kill")
+        .args([&format!("-{name}"), &child.id().to_string()])
+        .status();
+    assert!(status.is_ok_and(|status| status.success()), "{name}");
+}
+
+/// This test listens in the place of the viewer, which is a script.
+#[cfg(unix)]
+#[test]
+fn what_is_served_is_for_this_machine_unless_it_is_said_otherwise() {
+    let script =
+        r#"sleep 60 & echo $! > sleeper; for a in "$@"; do echo "$a"; done > arguments; wait"#;
+    for (bind, ip, name) in [
+        (&[][..], "127.0.0.1", "INT"),
+        (&["--bind", "0.0.0.0"], "0.0.0.0", "TERM"),
+        (&["--bind", "localhost"], "127.0.0.1", "HUP"),
+    ] {
+        let bench = with_viewer(script);
+        let mut child = replay(&bench, &[bind, &["--serve", "--json"]].concat())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        let recording = started_with(&bench, "");
+        assert_eq!(started_with(&bench, "--bind="), ip, "{recording}");
+        let port = |flag| started_with(&bench, flag).parse::<u16>().expect("a number");
+        let (data, page) = (port("--port="), port("--web-viewer-port="));
+        let listen = |port| std::net::TcpListener::bind((ip, port)).expect("it is free");
+        let _places = (listen(data), listen(page));
+        let text = fs::read_to_string(bench.path("arguments")).unwrap_or_default();
+        let origin = text
+            .lines()
+            .find_map(|line| line.strip_prefix("--cors-allow-origin="));
+        let others = (ip == "0.0.0.0").then(|| format!("http://*:{page}"));
+        assert_eq!(origin, others.as_deref(), "other pages than its own");
+        assert_eq!(names(&bench, "tmp").len(), 1, "the recording");
+        let shown: serde_json::Value =
+            serde_json::from_str(&first_line(&mut child)).expect("one JSON object");
+        let address = shown["address"].as_str().unwrap_or_default();
+        assert!(
+            address.starts_with(&format!("http://127.0.0.1:{page}/?url=")),
+            "{address}"
+        );
+        assert!(
+            address.contains(&format!("127.0.0.1%3A{data}")),
+            "{address}"
+        );
+        signal(&child, name);
+        assert!(child.wait().is_ok_and(|status| status.success()), "{name}");
+        assert_eq!(names(&bench, "tmp"), Vec::<String>::new());
+        // The viewer, and what it started, are gone as well.
+        let sleeper = fs::read_to_string(bench.path("sleeper")).expect("its number");
+        let state = std::process::Command::new("ps")
+            .args(["-o", "stat=", "-p", sleeper.trim()])
+            .output();
+        let state = state.map(|s| String::from_utf8_lossy(&s.stdout).trim().to_owned());
+        assert!(
+            state
+                .as_ref()
+                .is_ok_and(|s| s.is_empty() || s.starts_with('Z')),
+            "{state:?}"
+        );
+    }
+}
+
+/// A port that was named is that one or none; one that wasn't is a free one.
+#[cfg(unix)]
+#[test]
+fn a_port_that_is_taken_is_named() {
+    let bench = with_viewer("exit 3");
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("there is a free port");
+    let place = taken.local_addr().expect("an address").to_string();
+    for sink in ["--serve", "--rerun"] {
+        let output = replay(&bench, &[sink, "--bind", &place])
+            .output()
+            .expect("it runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(&place) && said.contains("`--bind`"), "{said}");
+    }
+    for (bind, reason) in [
+        ("203.0.113.77", "is not an address of this machine"),
+        ("somewhere", "give an address of this machine"),
+    ] {
+        let output = replay(&bench, &["--serve", "--bind", bind])
+            .output()
+            .expect("it runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(reason), "{said}");
+    }
+}
+
+#[test]
+fn a_replay_has_to_go_somewhere() {
+    let bench = Workbench::with_clip();
+    let said = bench.complaint(&["replay", "sway.txt"], 2);
+    for flag in ["`--rerun`", "`--serve`", "`--save FILE.rrd`"] {
+        assert!(said.contains(flag), "{said}");
+    }
+    let line = ["replay", "sway.txt", "--save", "a.rrd", "--bind", "0.0.0.0"];
+    let said = bench.complaint(&line, 2);
+    assert!(said.contains("`--bind` is for the viewer"), "{said}");
+    assert!(!bench.path("a.rrd").exists());
+}
+
+/// The real viewer, where it is installed.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_viewer_itself_listens_to_this_machine_alone() {
+    let doctor = Workbench::new().json(&["doctor"]);
+    let checks = doctor["checks"].as_array().cloned().unwrap_or_default();
+    let viewer = checks.iter().find(|check| check["id"] == "viewer");
+    let sockets = || std::process::Command::new("ss").arg("-ltn").output();
+    if viewer.is_none_or(|check| check["state"] != "good") || sockets().is_err() {
+        mimic_test_support::skip("no rerun viewer, or no `ss` to see where it listens");
+        return;
+    }
+    let bench = Workbench::with_clip();
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("mimic"))
+        .args(["replay", "sway.txt", "--serve", "--json"])
+        .current_dir(bench.path("."))
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let shown: serde_json::Value =
+        serde_json::from_str(&first_line(&mut child)).expect("one JSON object");
+    let address = shown["address"]
+        .as_str()
+        .unwrap_or_default()
+        .replace("%3A", ":");
+    let listening = sockets().expect("it ran before").stdout;
+    let listening = String::from_utf8_lossy(&listening).into_owned();
+    let ports: Vec<&str> = address
+        .split("127.0.0.1:")
+        .skip(1)
+        .filter_map(|rest| rest.split(|c: char| !c.is_ascii_digit()).next())
+        .collect();
+    assert_eq!(ports.len(), 2, "{address}");
+    for port in ports {
+        let ends = format!(":{port}");
+        let places = listening
+            .split_whitespace()
+            .filter(|word| word.ends_with(&ends));
+        let places: Vec<&str> = places.collect();
+        assert_eq!(places, [format!("127.0.0.1:{port}")], "{listening}");
+    }
+    signal(&child, "INT");
+    let output = child.wait_with_output().expect("it ends");
+    assert!(output.status.success());
+    assert_eq!(
+        String::from_utf8_lossy(&output.stderr),
+        "",
+        "no talk of the viewer"
+    );
 }

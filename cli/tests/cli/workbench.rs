@@ -7,6 +7,10 @@ use tempfile::TempDir;
 
 pub struct Workbench(TempDir);
 
+/// A preset whose training takes a moment.
+pub const TINY: &[u8] =
+    br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 32, "hidden": [8] }"#;
+
 impl Workbench {
     pub fn new() -> Self {
         Self(TempDir::new().expect("a temporary folder can be made"))
@@ -22,10 +26,7 @@ impl Workbench {
     /// With `runs/sway`: a run that has learned nothing, but is whole.
     pub fn with_run() -> Self {
         let bench = Self::with_clip();
-        bench.write(
-            "tiny.json",
-            br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 32, "hidden": [8] }"#,
-        );
+        bench.write("tiny.json", TINY);
         let line = ["train", "sway.txt", "--preset", "tiny.json"];
         bench.mimic(&line).assert().success();
         bench

@@ -1,0 +1,341 @@
+//! A result takes the place of what the same command made from the same input, and of nothing else.
+
+use crate::workbench::Workbench;
+use std::fs;
+
+/// Two clips of one name, in the folders `a` and `b`: `b` sways twice as fast.
+fn with_namesakes() -> Workbench {
+    let bench = Workbench::with_clip();
+    for folder in ["a", "b"] {
+        fs::create_dir(bench.path(folder)).expect("a folder can be made");
+    }
+    let text = fs::read_to_string(bench.path("sway.txt")).expect("the clip is there");
+    bench.write("a/sway.txt", text.as_bytes());
+    let fast = text.replace("0.03333333333333333", "0.016666666666666666");
+    assert_ne!(text, fast);
+    bench.write("b/sway.txt", fast.as_bytes());
+    bench
+}
+
+/// Runs a line that has to be refused because of `file`, which stays as it is; then the same with `--force`.
+fn refused(bench: &Workbench, line: &[&str], file: &str) {
+    let before = fs::read(bench.path(file)).expect("it is there");
+    let error = bench.error_about(file, line, 2);
+    let remedy = error["remedy"].as_str().unwrap_or_default();
+    assert!(remedy.contains("`--force`"), "{error}");
+    let kept = fs::read(bench.path(file)).expect("it is still there");
+    assert_eq!(kept, before, "{line:?}");
+    bench.mimic(line).arg("--force").assert().success();
+    let now = fs::read(bench.path(file)).expect("it is there");
+    assert_ne!(now, before, "{line:?} --force");
+    assert!(leftovers(bench).is_empty(), "{:?}", leftovers(bench));
+}
+
+fn leftovers(bench: &Workbench) -> Vec<String> {
+    let entries = fs::read_dir(bench.path(".")).expect("a folder").flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.starts_with('.')).collect()
+}
+
+#[test]
+fn a_namesake_is_not_replaced() {
+    let bench = with_namesakes();
+    for (verb, flag, out) in [
+        ("import", "--out", "sway.clip"),
+        ("retarget", "--out", "sway.motion"),
+        ("tracks", "--plot", "sway.svg"),
+        ("tracks", "--csv", "sway.csv"),
+        #[cfg(feature = "rerun")]
+        ("replay", "--save", "sway.rrd"),
+    ] {
+        let line = |input| [verb, input, flag, out];
+        bench.mimic(&line("a/sway.txt")).assert().success();
+        // The daily loop: the same once more, by another way to the same file, and where there are options with others.
+        bench.mimic(&line("a/../a/sway.txt")).assert().success();
+        if flag != "--csv" {
+            let other = [&line("a/sway.txt")[..], &["--fps", "60"]].concat();
+            bench.mimic(&other).assert().success();
+        }
+        refused(&bench, &line("b/sway.txt"), out);
+    }
+}
+
+/// Where no name is given, several inputs lead to one.
+#[test]
+fn names_that_follow_from_the_input_are_no_exception() {
+    let bench = with_namesakes();
+    bench.mimic(&["import", "a/sway.txt"]).assert().success();
+    refused(&bench, &["import", "b/sway.txt"], "sway.clip");
+    refused(&bench, &["import", "a/sway.txt"], "sway.clip");
+    bench
+        .mimic(&["import", "a/sway.txt", "--out", "c/"])
+        .assert()
+        .success();
+    bench
+        .mimic(&["retarget", "sway.clip", "--fps", "30"])
+        .assert()
+        .code(2);
+    bench
+        .mimic(&["import", "b/sway.txt", "--out", "d/"])
+        .assert()
+        .success();
+    bench.mimic(&["retarget", "c/sway.clip"]).assert().success();
+    refused(&bench, &["retarget", "d/sway.clip"], "sway.motion");
+    // Of several files the others are imported all the same.
+    bench.write(
+        "a/swing.txt",
+        &fs::read(bench.path("a/sway.txt")).expect("there"),
+    );
+    bench
+        .mimic(&["import", "b/sway.txt", "a/swing.txt"])
+        .assert()
+        .code(2);
+    assert!(bench.path("swing.clip").exists());
+}
+
+#[test]
+fn two_edits_of_a_clip_are_two_clips() {
+    let bench = Workbench::with_clip();
+    bench.mimic(&["import", "sway.txt"]).assert().success();
+    let mirror = ["edit", "sway.clip", "--mirror"];
+    bench.mimic(&mirror).assert().success();
+    bench.mimic(&mirror).assert().success();
+    for other in [
+        &["--speed", "2"][..],
+        &["--trim", "0..0.5"],
+        &["--trim", "0..0.6"],
+        &["--mirror", "--in-place"],
+    ] {
+        refused(
+            &bench,
+            &[&["edit", "sway.clip"], other].concat(),
+            "sway-edited.clip",
+        );
+    }
+    // An import doesn't take the place of an edit, nor of a clip that somebody's own program changed.
+    bench
+        .mimic(&["edit", "sway.txt", "--mirror", "--out", "mine.clip"])
+        .assert()
+        .success();
+    refused(
+        &bench,
+        &["import", "sway.txt", "--out", "mine.clip"],
+        "mine.clip",
+    );
+    let mut bytes = fs::read(bench.path("mine.clip")).expect("it is there");
+    *bytes.last_mut().expect("there are bytes") ^= 1;
+    bench.write("mine.clip", &bytes);
+    refused(
+        &bench,
+        &["import", "sway.txt", "--out", "mine.clip"],
+        "mine.clip",
+    );
+}
+
+#[test]
+fn what_somebody_wrote_by_hand_stays() {
+    let bench = Workbench::with_clip();
+    let map = ["info", "sway.txt", "--write-map", "map.json"];
+    bench.mimic(&map).assert().success();
+    bench.mimic(&map).assert().success();
+    let text = fs::read_to_string(bench.path("map.json")).expect("the map is there");
+    bench.write(
+        "map.json",
+        text.replace("  \"neck", "\n  \"neck").as_bytes(),
+    );
+    bench.write("map.json", format!("{text}\n").as_bytes());
+    refused(&bench, &map, "map.json");
+    let plot = ["tracks", "sway.txt", "--plot", "sway.svg"];
+    bench.mimic(&plot).assert().success();
+    let text = fs::read_to_string(bench.path("sway.svg")).expect("the drawing is there");
+    bench.write("sway.svg", text.replace("#fff", "#eee").as_bytes());
+    refused(&bench, &plot, "sway.svg");
+    for (line, file) in [
+        (&["import", "sway.txt"][..], "sway.clip"),
+        (&["retarget", "sway.txt"], "sway.motion"),
+        (&["edit", "sway.txt", "--mirror"], "sway-edited.clip"),
+        (&["tracks", "sway.txt", "--csv", "mine.csv"], "mine.csv"),
+        (&["man", "--out", "."], "./mimic.1"),
+        #[cfg(feature = "rerun")]
+        (&["replay", "sway.txt", "--save", "mine.rrd"], "mine.rrd"),
+    ] {
+        bench.write(file, b"mine\n");
+        refused(&bench, line, file);
+        bench.mimic(line).assert().success();
+    }
+}
+
+#[test]
+fn what_is_made_of_runs_spares_others() {
+    let bench = Workbench::with_run();
+    let train = [
+        "train",
+        "sway.txt",
+        "--preset",
+        "tiny.json",
+        "--seed",
+        "5",
+        "--out",
+        "other/sway",
+    ];
+    bench.mimic(&train).assert().success();
+    bench.mimic(&["plot", "sway"]).assert().success();
+    bench
+        .mimic(&["plot", "sway", "--smooth", "1"])
+        .assert()
+        .success();
+    refused(&bench, &["plot", "other/sway"], "sway.svg");
+    let eval = |run| {
+        [
+            "eval",
+            run,
+            "--episodes",
+            "2",
+            "--seconds",
+            "1",
+            "--out",
+            "e.json",
+        ]
+    };
+    bench.mimic(&eval("sway")).assert().success();
+    bench.mimic(&eval("sway")).assert().success();
+    let before = fs::read(bench.path("e.json")).expect("it is there");
+    let other = bench
+        .mimic(&eval("other/sway"))
+        .arg("--json")
+        .assert()
+        .code(2);
+    // It was measured, so it is printed.
+    let printed: serde_json::Value =
+        serde_json::from_slice(&other.get_output().stdout).expect("one JSON object");
+    assert!(
+        printed["survival"].is_number() && printed["error"]["exit"] == 2,
+        "{printed}"
+    );
+    assert_eq!(fs::read(bench.path("e.json")).expect("it is there"), before);
+    bench
+        .mimic(&eval("other/sway"))
+        .arg("--force")
+        .assert()
+        .success();
+    assert_ne!(fs::read(bench.path("e.json")).expect("it is there"), before);
+    // Not even by force: a run would be lost.
+    for file in ["config.json", "eval.json"] {
+        let path = format!("runs/sway/{file}");
+        let before = fs::read(bench.path(&path)).expect("the run has it");
+        bench.error_about(&path, &["eval", "other/sway", "--out", &path, "--force"], 2);
+        assert_eq!(fs::read(bench.path(&path)).expect("the run has it"), before);
+    }
+}
+
+/// Takes of one name, or of names that make the same file name, are not the same.
+#[test]
+fn a_take_does_not_replace_another() {
+    let bench = crate::import::with_two_takes();
+    let line = |take| ["import", "two.gltf", "--take", take, "--out", "take.clip"];
+    bench.mimic(&line("up")).assert().success();
+    bench.mimic(&line("up")).assert().success();
+    refused(&bench, &line("down"), "take.clip");
+    for _ in 0..2 {
+        let all = ["import", "two.gltf", "--take", "all", "--out", "takes/"];
+        bench.mimic(&all).assert().success();
+    }
+}
+
+#[test]
+fn a_result_is_called_what_it_is() {
+    let bench = Workbench::with_clip();
+    fs::create_dir(bench.path("folder")).expect("a folder can be made");
+    for (line, ending) in [
+        (&["import", "sway.txt", "--out", "sway.motion"][..], ".clip"),
+        (&["import", "sway.txt", "--out", "new"], ".clip"),
+        (
+            &["edit", "sway.txt", "--mirror", "--out", "new.fbx"],
+            ".clip",
+        ),
+        (&["retarget", "sway.txt", "--out", "new.clip"], ".motion"),
+        (&["tracks", "sway.txt", "--csv", "new.svg"], ".csv"),
+        (&["tracks", "sway.txt", "--plot", "new.png"], ".svg"),
+        (&["info", "sway.txt", "--write-map", "new.txt"], ".json"),
+        #[cfg(feature = "rerun")]
+        (&["replay", "sway.txt", "--save", "new.mp4"], ".rrd"),
+        #[cfg(feature = "rerun")]
+        (&["replay", "sway.txt", "--save", "new"], ".rrd"),
+        // Folders are no files.
+        (&["tracks", "sway.txt", "--csv", "folder"], "NAME.csv"),
+        (&["tracks", "sway.txt", "--plot", "folder"], "NAME.svg"),
+        (&["info", "sway.txt", "--write-map", "folder/"], "NAME.json"),
+    ] {
+        let file = line[line.len() - 1].trim_end_matches('/');
+        let said = bench.complaint(line, 2);
+        assert!(said.contains(file) && said.contains(ending), "{said}");
+        assert!(said.contains(line[line.len() - 2]), "the flag: {said}");
+        assert!(!bench.path(file).is_file(), "{line:?}");
+    }
+}
+
+/// Of several commands that write one file at once, one does, and the others say so.
+#[test]
+fn of_several_at_once_one_writes() {
+    let bench = Workbench::new();
+    let text = Workbench::with_clip();
+    let text = fs::read(text.path("sway.txt")).expect("the clip is there");
+    let folders: Vec<String> = (0..8).map(|n| format!("f{n}")).collect();
+    for folder in &folders {
+        fs::create_dir(bench.path(folder)).expect("a folder can be made");
+        bench.write(&format!("{folder}/sway.txt"), &text);
+    }
+    let program = assert_cmd::cargo::cargo_bin("mimic");
+    let start = |(number, folder): (usize, &String)| {
+        let fps = (30 + number).to_string();
+        std::process::Command::new(&program)
+            .args([
+                "import",
+                &format!("{folder}/sway.txt"),
+                "--fps",
+                &fps,
+                "--out",
+                "sway.clip",
+            ])
+            .current_dir(bench.path("."))
+            .output()
+    };
+    let codes: Vec<_> = std::thread::scope(|scope| {
+        let start = &start;
+        let all: Vec<_> = folders
+            .iter()
+            .enumerate()
+            .map(|one| scope.spawn(move || start(one)))
+            .collect();
+        all.into_iter()
+            .map(|one| {
+                one.join()
+                    .expect("no panic")
+                    .expect("it runs")
+                    .status
+                    .code()
+            })
+            .collect()
+    });
+    let count = |code| codes.iter().filter(|c| **c == Some(code)).count();
+    assert_eq!((count(0), count(2)), (1, 7), "{codes:?}");
+    assert!(leftovers(&bench).is_empty());
+}
+
+/// What a killed process left is gone after the next write into its folder.
+#[cfg(target_os = "linux")]
+#[test]
+fn unfinished_files_of_killed_processes_are_removed() {
+    let bench = Workbench::with_clip();
+    let mut dead = std::process::Command::new("true")
+        .spawn()
+        .expect("it starts");
+    let number = dead.id();
+    dead.wait().expect("it ends");
+    for name in ["Ab3dEf", "zzzzzz"] {
+        bench.write(&format!(".mimic-{number}-{name}"), b"half");
+    }
+    bench.write(".mimic-mine", b"somebody's own");
+    bench.mimic(&["import", "sway.txt"]).assert().success();
+    assert_eq!(leftovers(&bench), [".mimic-mine"]);
+}
