@@ -26,7 +26,7 @@ pub fn reference(index: usize) -> String {
 }
 
 /// Whether a run writes files of this name.
-pub(super) fn is_own(name: &OsStr) -> bool {
+pub fn is_own(name: &OsStr) -> bool {
     let fixed = [
         CONFIG, METRICS, CHECKPOINT, POLICY, EVALUATION, RECORDING, SKELETON, SLOTS, LOCK,
     ];

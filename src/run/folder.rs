@@ -99,6 +99,7 @@ impl Run {
             lock: None,
             plan: config.plan,
             skeleton: Skeleton::from_mjcf(&config.skeleton, &mjcf, Some(&slots))
+                .map_err(|e| e.in_files(&dir.join(files::SKELETON), &dir.join(files::SLOTS)))
                 .map_err(RunError::in_skeleton(&dir.join(files::SKELETON)))?,
             motions,
         })

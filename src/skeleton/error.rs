@@ -71,7 +71,7 @@ impl SkeletonError {
     }
 
     /// The same error with the names of the files that the texts came from.
-    pub(super) fn in_files(mut self, mjcf: &Path, slots: &Path) -> Self {
+    pub(crate) fn in_files(mut self, mjcf: &Path, slots: &Path) -> Self {
         match &mut self {
             Self::Mjcf { file, .. } => *file = Some(mjcf.to_owned()),
             Self::Slots { file, .. } => *file = Some(slots.to_owned()),

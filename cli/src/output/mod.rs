@@ -11,6 +11,7 @@ pub use maker::Maker;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use mimic::file::Unfinished;
+use mimic::run::files;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -54,6 +55,7 @@ impl Output {
             let cause = "this is not a file of the disk that could be replaced";
             return Err(Failure::input(path, cause).with_remedy(self.elsewhere()));
         }
+        self.spare_run()?;
         let is_clear = self.force || !is_taken(path) || !self.form.is_judged_by_mark();
         match is_clear || self.is_ours(self.mark().as_deref()) {
             true => Ok(()),
@@ -157,6 +159,23 @@ impl Output {
         }
     }
 
+    /// Refuses to write one of the files that a run is made of. No force helps: the run would be lost.
+    fn spare_run(&self) -> Outcome {
+        let folder = self.path.parent().filter(|f| !f.as_os_str().is_empty());
+        let is_run = locate::is_run(folder.unwrap_or(Path::new(".")));
+        match self
+            .path
+            .file_name()
+            .filter(|name| is_run && files::is_own(name))
+        {
+            Some(_) => {
+                Err(Failure::input(&self.path, "this is a file of a run")
+                    .with_remedy(self.elsewhere()))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn refused(&self) -> Failure {
         let what = match self.maker.first() {
             Some(input) => format!("what the same command made from `{}`", input.display()),
@@ -187,6 +206,10 @@ fn is_taken(path: &Path) -> bool {
 
 /// Makes a folder for results, and those that it is in.
 pub fn make_folder(folder: &Path) -> Outcome {
+    if folder.is_file() {
+        let cause = "this is a file, and the result needs a folder";
+        return Err(Failure::input(folder, cause).with_remedy("name another folder with `--out`"));
+    }
     std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))
 }
 

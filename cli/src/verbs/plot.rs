@@ -123,7 +123,10 @@ impl Log {
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);
         for (number, line) in whole.lines().enumerate() {
             let line = serde_json::from_str(line).map_err(|e| {
-                Failure::input(&path, format!("this is not an iteration ({e})"))
+                // The reader counts lines too, from the start of this one.
+                let e = e.to_string();
+                let cause = e.split(" at line ").next().unwrap_or(&e);
+                Failure::input(&path, format!("this is not an iteration ({cause})"))
                     .with_place(format!("line {}", number + 1))
                     .with_remedy("remove the line")
             })?;
@@ -243,6 +246,13 @@ fn mean_around(points: &[(f64, f64)], window: usize) -> Vec<(f64, f64)> {
     (0..points.len()).map(|i| (points[i].0, mean(i))).collect()
 }
 
+fn iterations(count: usize) -> String {
+    match count {
+        1 => "1 iteration".to_owned(),
+        count => format!("{count} iterations"),
+    }
+}
+
 fn report(path: &Path, names: &[String], logs: &[Log]) -> Value {
     let run = |(name, log): (&String, &Log)| {
         let column = |field: &str| -> Vec<Value> {
@@ -269,9 +279,9 @@ fn summary(path: &Path, names: &[String], logs: &[Log]) -> String {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
         text += &format!(
-            "  {}: {} iterations, {:.2} M samples, normalised return {}, survival {}, local error {} mm\n",
+            "  {}: {}, {:.2} M samples, normalised return {}, survival {}, local error {} mm\n",
             plain(name),
-            log.lines.len(),
+            iterations(log.lines.len()),
             log.samples() / 1e6,
             figure(last, 3),
             figure(log.evaluated("survival"), 3),

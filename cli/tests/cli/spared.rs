@@ -220,10 +220,17 @@ fn what_is_made_of_runs_spares_others() {
         .success();
     assert_ne!(fs::read(bench.path("e.json")).expect("it is there"), before);
     // Not even by force: a run would be lost.
-    for file in ["config.json", "eval.json"] {
+    for (line, file) in [
+        (&["eval", "other/sway", "--out"][..], "config.json"),
+        (&["eval", "other/sway", "--out"], "eval.json"),
+        (&["info", "sway.txt", "--write-map"], "skeleton.json"),
+        (&["retarget", "sway.txt", "--out"], "reference-0.motion"),
+        #[cfg(feature = "rerun")]
+        (&["replay", "other/sway", "--save"], "replay.rrd"),
+    ] {
         let path = format!("runs/sway/{file}");
         let before = fs::read(bench.path(&path)).expect("the run has it");
-        bench.error_about(&path, &["eval", "other/sway", "--out", &path, "--force"], 2);
+        bench.error_about(&path, &[line, &[&path, "--force"]].concat(), 2);
         assert_eq!(fs::read(bench.path(&path)).expect("the run has it"), before);
     }
 }
@@ -261,7 +268,7 @@ fn a_result_is_called_what_it_is() {
         (&["replay", "sway.txt", "--save", "new.mp4"], ".rrd"),
         #[cfg(feature = "rerun")]
         (&["replay", "sway.txt", "--save", "new"], ".rrd"),
-        // Folders are no files.
+        // Folders are no files, and files no folders.
         (&["tracks", "sway.txt", "--csv", "folder"], "NAME.csv"),
         (&["tracks", "sway.txt", "--plot", "folder"], "NAME.svg"),
         (&["info", "sway.txt", "--write-map", "folder/"], "NAME.json"),

@@ -148,6 +148,28 @@ fn replay_without_a_viewer_says_how_to_get_one() {
     assert!(said.contains("host:port"), "{said}");
 }
 
+/// Two characters of one name are told apart in words.
+#[test]
+fn a_character_that_changed_is_named_as_such() {
+    let bench = Workbench::with_clip();
+    let humanoid = concat!(env!("CARGO_MANIFEST_DIR"), "/../skeletons/humanoid.xml");
+    let text = std::fs::read_to_string(humanoid).expect("the character is there");
+    let slots = std::fs::read(humanoid.replace(".xml", ".json")).expect("its slots are there");
+    bench.write("my.xml", text.as_bytes());
+    bench.write("my.json", &slots);
+    let line = ["retarget", "sway.txt", "--skeleton", "my.xml"];
+    bench.mimic(&line).assert().success();
+    bench.write("my.xml", format!("{text}<!-- heavier -->").as_bytes());
+    let line = ["tracks", "sway.motion", "--skeleton", "my.xml"];
+    let said = bench.complaint(&line, 2);
+    assert!(
+        said.contains("another skeleton that is called `my` too") && !said.contains("differs"),
+        "{said}"
+    );
+    let said = bench.complaint(&["tracks", "sway.motion", "--skeleton", "robot"], 2);
+    assert!(said.contains("for skeleton `my`, not for `robot`"), "{said}");
+}
+
 #[test]
 fn options_that_come_too_late_are_refused() {
     let bench = Workbench::with_clip();
