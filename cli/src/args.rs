@@ -4,6 +4,7 @@ use crate::failure::{Failure, Outcome};
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, ValueEnum};
 use mimic::clip::LoopMode;
+use mimic::explain::plain;
 use mimic::humanoid::Slot;
 use mimic::import::{Options, UpAxis};
 use mimic::skeleton::Skeleton;
@@ -24,6 +25,9 @@ pub struct Talk {
     pub verbose: bool,
 }
 
+/// Most frames per second, which is what clips can have.
+const MOST_FPS: f64 = 10_000.0;
+
 /// Whether a result may take the place of something else.
 #[derive(Args, Clone, Copy, Default)]
 pub struct Replace {
@@ -40,7 +44,7 @@ pub struct ImportArgs {
     #[arg(long, value_name = "TAKE", value_parser = NonEmptyStringValueParser::new())]
     take: Option<String>,
     /// Frames per second to sample at; below 27, a motion is sampled at a multiple of it [default: the take's own rate]
-    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = frame_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Part of the take to keep, in seconds from its start, e.g. 0.5..2, 1.. or ..2
     #[arg(long, value_name = "A..B", value_parser = span, allow_hyphen_values = true)]
@@ -151,6 +155,14 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Frames per second, up to what a clip may have.
+pub fn frame_rate(text: &str) -> Result<f64, String> {
+    match positive(text)? {
+        rate if rate <= MOST_FPS => Ok(rate),
+        _ => Err(format!("must be at most {MOST_FPS}")),
+    }
+}
+
 /// A slot of the joint map with a number, as `head=3`.
 fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
     let known = || Slot::ALL.map(Slot::name).join(", ");
@@ -158,8 +170,13 @@ fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
         .split_once('=')
         .ok_or("give a slot and its weight, e.g. head=3")?;
     let slot = Slot::ALL.into_iter().find(|slot| slot.name() == name);
-    let slot =
-        slot.ok_or_else(|| format!("there is no slot `{name}`; the slots are {}", known()))?;
+    let slot = slot.ok_or_else(|| {
+        format!(
+            "there is no slot `{}`; the slots are {}",
+            plain(name),
+            known()
+        )
+    })?;
     let weight = weight.parse().map_err(|_| "the weight is not a number")?;
     Ok((slot, weight))
 }

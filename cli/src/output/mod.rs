@@ -69,15 +69,14 @@ impl Output {
         self.check()?;
         let mark = self.mark();
         let bytes = bytes(mark.as_deref())?;
+        // Before anything else: this tidies the folder, too.
+        let mut file = Unfinished::beside(&self.path).map_err(|e| self.unwritten(e))?;
         if is_taken(&self.path) && self.form.holds(&self.path, &bytes) {
             return Ok(());
         }
-        let file = || {
-            let mut file = Unfinished::beside(&self.path)?;
-            file.file().write_all(&bytes)?;
-            Ok(file)
-        };
-        self.settle(file().map_err(|e| self.unwritten(e))?, mark.as_deref())
+        let written = file.file().write_all(&bytes);
+        written.map_err(|e| self.unwritten(e))?;
+        self.settle(file, mark.as_deref())
     }
 
     /// Writes a text, with what made it where the form has a place for that.

@@ -125,6 +125,10 @@ fn numbers_that_can_not_be_are_told_why() {
             "must be greater than 0",
         ),
         (
+            &["import", "sway.txt", "--fps", "1e300"],
+            "must be at most 10000",
+        ),
+        (
             &["import", "sway.txt", "--fps", "-3"],
             "must be greater than 0",
         ),

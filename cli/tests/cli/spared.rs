@@ -339,10 +339,13 @@ fn unfinished_files_of_killed_processes_are_removed() {
         .expect("it starts");
     let number = dead.id();
     dead.wait().expect("it ends");
-    for name in ["Ab3dEf", "zzzzzz"] {
-        bench.write(&format!(".mimic-{number}-{name}"), b"half");
-    }
     bench.write(".mimic-mine", b"somebody's own");
-    bench.mimic(&["import", "sway.txt"]).assert().success();
-    assert_eq!(leftovers(&bench), [".mimic-mine"]);
+    // The second time it is there already.
+    for _ in 0..2 {
+        for name in ["Ab3dEf", "zzzzzz"] {
+            bench.write(&format!(".mimic-{number}-{name}"), b"half");
+        }
+        bench.mimic(&["import", "sway.txt"]).assert().success();
+        assert_eq!(leftovers(&bench), [".mimic-mine"]);
+    }
 }

@@ -167,7 +167,10 @@ fn a_character_that_changed_is_named_as_such() {
         "{said}"
     );
     let said = bench.complaint(&["tracks", "sway.motion", "--skeleton", "robot"], 2);
-    assert!(said.contains("for skeleton `my`, not for `robot`"), "{said}");
+    assert!(
+        said.contains("for skeleton `my`, not for `robot`"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -31,7 +31,10 @@ fn what_retargeting_finds_is_said_once() {
     let bench = with_gap();
     let said = talk(&bench, &["retarget", "gap.txt"]);
     assert_eq!(said.matches("[loop-gap]").count(), 1, "{said}");
-    assert!(said.contains("(`--loop`) [loop-gap]"), "the flag that decides otherwise: {said}");
+    assert!(
+        said.contains("(`--loop`) [loop-gap]"),
+        "the flag that decides otherwise: {said}"
+    );
     let report = bench.json(&["retarget", "gap.txt"]);
     let problems = report["problems"].as_array().into_iter().flatten();
     let ids: Vec<_> = problems.filter(|p| p["severity"] != "note").collect();
