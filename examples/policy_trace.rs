@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut seen = vec![0.0; size(task.observation())];
     let mut trace = Vec::new();
     let start = |share| EpisodeStart::new(0, StartState::Reference(share));
-    env.start_at(&start(0.3));
+    env.start_at(&start(0.3))?;
     for _ in 0..steps {
         env.observe(&mut seen);
         let mut record = state(task.model(), env.as_ref());
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         record["targets"] = env.targets().iter().map(target).collect();
         trace.push(record);
         if outcome != Outcome::Running {
-            env.start_at(&start(0.0));
+            env.start_at(&start(0.0))?;
         }
     }
     println!(

@@ -31,7 +31,7 @@ pub fn perform<A: Agent>(
 ) -> Result<Vec<Episode>, EvaluateError> {
     let task = agent.task();
     let start = |start: &EpisodeStart| Running::new(task.as_ref(), start, seconds);
-    let mut all: Vec<Running> = starts.iter().map(start).collect();
+    let mut all: Vec<Running> = starts.iter().map(start).collect::<Result<_, _>>()?;
     let steps = all.iter().map(|running| running.episode.possible as f64);
     check_steps(steps.sum())?;
     let (mut memory, mut actions) = (A::Memory::default(), Vec::new());
@@ -70,15 +70,15 @@ pub(super) fn check_steps(steps: f64) -> Result<(), EvaluateError> {
 }
 
 impl Running {
-    fn new(task: &dyn Task, start: &EpisodeStart, seconds: f64) -> Self {
+    fn new(task: &dyn Task, start: &EpisodeStart, seconds: f64) -> Result<Self, EvaluateError> {
         let mut environment = task.environment(Purpose::Evaluation { seconds });
-        environment.start_at(start);
+        environment.start_at(start)?;
         let possible = environment.possible_steps() as usize;
-        Running {
+        Ok(Running {
             episode: Episode::new(*start, task.control_hz(), possible),
             environment,
             outcome: Outcome::Running,
-        }
+        })
     }
 }
 
@@ -92,9 +92,6 @@ fn keep(episode: &mut Episode, task: &dyn Task, environment: &dyn Environment, s
 ///
 /// # Errors
 /// A task of another shape than the agent's, or a case that it doesn't have.
-///
-/// # Panics
-/// If the first number is beyond the task's cases.
 pub fn perform_sequence<A: Agent>(
     agent: &A,
     cases: &[usize],
@@ -104,7 +101,7 @@ pub fn perform_sequence<A: Agent>(
     let first = cases.first().copied().unwrap_or(0);
     let start = EpisodeStart::new(first, StartState::Reference(0.0));
     let mut environment = task.environment(Purpose::Performance);
-    environment.start_at(&start);
+    environment.start_at(&start)?;
     let mut episode = Episode::new(start, task.control_hz(), 0);
     let mut memory = A::Memory::default();
     let mut advance = |environment: &mut dyn Environment, episode: &mut Episode| {

@@ -68,7 +68,10 @@ pub trait Environment: Send {
     fn start(&mut self, draws: &mut Draws);
 
     /// Starts an episode outside training.
-    fn start_at(&mut self, start: &EpisodeStart);
+    ///
+    /// # Errors
+    /// A case that the task doesn't have.
+    fn start_at(&mut self, start: &EpisodeStart) -> Result<(), TaskError>;
 
     /// Takes what a player or a script asks for.
     ///

@@ -210,7 +210,7 @@ impl Bench {
             let mut observation = vec![0.0; size(self.task.observation())];
             let start = |i| EpisodeStart::new(0, StartState::Reference(self.share(i)));
             for (i, environment) in all.iter_mut().enumerate() {
-                environment.start_at(&start(i));
+                environment.start_at(&start(i))?;
             }
             self.count(|| {
                 let stepping = all.iter_mut().map(|e| (e.as_mut() as _, None));
@@ -218,7 +218,7 @@ impl Bench {
                 let steps = step_together(&mut stepping, &actions);
                 for (i, (environment, step)) in all.iter_mut().zip(&steps).enumerate() {
                     if step.outcome != Stands::Running {
-                        environment.start_at(&start(i));
+                        environment.start_at(&start(i))?;
                     }
                     environment.observe(&mut observation);
                 }

@@ -151,6 +151,14 @@ impl Imitation {
         self.look_ahead();
     }
 
+    fn reference_of(&self, number: usize) -> Result<Arc<Reference>, TaskError> {
+        let reference = self.references.get(number).cloned();
+        reference.ok_or(TaskError::NoSuchCase {
+            number,
+            cases: self.references.len(),
+        })
+    }
+
     /// Starts an episode of motion number `motion`. A start at rest stands where the first frame does.
     fn begin_motion(&mut self, motion: usize, state: StartState) {
         (self.motion, self.upcoming) = (motion, motion);
@@ -354,21 +362,19 @@ impl Environment for Imitation {
         self.schedule_transition(draws);
     }
 
-    fn start_at(&mut self, start: &EpisodeStart) {
+    fn start_at(&mut self, start: &EpisodeStart) -> Result<(), TaskError> {
+        self.reference_of(start.case)?;
         self.begin_motion(start.case, start.state);
         if let Some((ranges, seed)) = start.disturbance {
             self.disturb(ranges, seed);
         }
+        Ok(())
     }
 
     fn input(&mut self, input: Input) -> Result<(), TaskError> {
         match input {
             Input::Case(number) => {
-                let reference = self.references.get(number).cloned();
-                let reference = reference.ok_or(TaskError::NoSuchCase {
-                    number,
-                    cases: self.references.len(),
-                })?;
+                let reference = self.reference_of(number)?;
                 self.upcoming = number;
                 self.lead_to(&reference);
                 self.note_arrival();

@@ -14,7 +14,9 @@ use crate::retarget;
 use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
 use crate::task::dynamics::Masses;
-use crate::task::{Failure, Outcome, Perturbations, ReferenceState, step};
+use crate::task::{
+    EpisodeStart, Failure, Outcome, Perturbations, ReferenceState, StartState, TaskError, step,
+};
 use nalgebra::{Isometry3, Vector3};
 use std::path::Path;
 
@@ -426,4 +428,17 @@ fn an_episode_can_start_at_rest_where_the_motion_starts() {
         .rotation
         .angle_to(&env.world().states()[0].pose.rotation);
     assert!(straight < 1e-5, "the rest pose has straight arms");
+}
+
+#[test]
+fn a_case_that_the_task_lacks_is_an_error() {
+    let mut env = environment("walk.glb", None, 20.0);
+    let start = |case| EpisodeStart::new(case, StartState::Reference(0.0));
+    env.start_at(&start(0)).expect("there is one");
+    for case in [1, usize::MAX] {
+        let error = env
+            .start_at(&start(case))
+            .expect_err("there is no such one");
+        assert!(matches!(error, TaskError::NoSuchCase { number, cases: 1 } if number == case));
+    }
 }
