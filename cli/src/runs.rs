@@ -5,8 +5,8 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use crate::recording::Recording;
-use mimic::evaluate::{Agent, Options, perform, perform_sequence};
-use mimic::run::{CaseEvaluation, Claim, Controller, Run};
+use mimic::evaluate::{Agent, EvaluateError, Options, perform, perform_sequence};
+use mimic::run::{CaseEvaluation, Claim, Controller, Run, files};
 use mimic::task::{Episode, EpisodeStart, Perturbations};
 use std::path::Path;
 
@@ -68,8 +68,16 @@ pub fn record(run: &Run, start: EpisodeStart, seconds: f64) -> Outcome<Recording
         return Err(Failure::input(run.dir(), cause)
             .with_remedy(format!("choose a number from 1 to {count}")));
     };
-    let episodes = perform(&controller, &[start], seconds)?;
+    let episodes = perform(&controller, &[start], seconds).map_err(|e| blame(run, e))?;
     shown(&motion.name, &controller, &episodes[0])
+}
+
+/// What the agent can't do is its policy's fault; what was asked for isn't.
+fn blame(run: &Run, error: EvaluateError) -> Failure {
+    match error {
+        EvaluateError::Learn(_) => Failure::in_file(&run.dir().join(files::POLICY), error),
+        _ => error.into(),
+    }
 }
 
 fn shown(name: &str, controller: &Controller, episode: &Episode) -> Outcome<Recording> {
@@ -96,7 +104,8 @@ pub fn record_sequence(
         .map(|name| number_of(run, name.trim()))
         .collect::<Outcome<_>>()?;
     let controller = run.controller()?;
-    let (episode, begun) = perform_sequence(&controller, &numbers, seconds)?;
+    let performed = perform_sequence(&controller, &numbers, seconds);
+    let (episode, begun) = performed.map_err(|e| blame(run, e))?;
     if episode.failure.is_some() {
         let advice = match (begun, run.plan().task.has_transitions()) {
             (2.., false) => {

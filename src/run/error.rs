@@ -55,18 +55,20 @@ pub enum RunError {
     /// A reference motion that can't be read or written.
     Motion(MotionError),
     /// A character that can't be used.
-    Skeleton {
-        /// The file that holds it.
-        path: PathBuf,
-        /// What is wrong with it.
-        error: SkeletonError,
-    },
+    Skeleton(SkeletonError),
     /// Settings or motions from which no task can be built.
     Task(TaskError),
     /// Learning that can't begin or go on.
     Learn(LearnError),
     /// An evaluation that can't be done.
     Evaluate(EvaluateError),
+    /// What is wrong with the content of a file of the run.
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: Box<RunError>,
+    },
 }
 
 macro_rules! from {
@@ -79,7 +81,7 @@ macro_rules! from {
     };
 }
 
-from!(FileError => File, MotionError => Motion, TaskError => Task, LearnError => Learn);
+from!(FileError => File, MotionError => Motion, SkeletonError => Skeleton, TaskError => Task, LearnError => Learn);
 
 impl From<EvaluateError> for RunError {
     fn from(error: EvaluateError) -> Self {
@@ -101,10 +103,12 @@ impl RunError {
         }
     }
 
-    /// The error of a character that the file `path` holds.
-    pub(super) fn in_skeleton(path: &Path) -> impl FnOnce(SkeletonError) -> Self {
-        let path = path.to_owned();
-        move |error| Self::Skeleton { path, error }
+    /// Blames an error that names no file on the file `path`.
+    pub(super) fn in_file<E: Into<Self>>(path: &Path) -> impl Fn(E) -> Self {
+        move |error| Self::InFile {
+            path: path.to_owned(),
+            error: Box::new(error.into()),
+        }
     }
 
     /// Whether the folder for a new run is in use, so that another one has to be found.
@@ -120,6 +124,7 @@ impl RunError {
         match self {
             Self::Task(error) => error.is_setting(),
             Self::Learn(error) => matches!(error, LearnError::Setting(_)),
+            Self::InFile { error, .. } => error.is_setting(),
             _ => false,
         }
     }
@@ -170,18 +175,17 @@ impl Explain for RunError {
                 .remedy("correct the file, or train a new run"),
             Self::File(error) => error.explain(),
             Self::Motion(error) => error.explain(),
-            Self::Skeleton { path, error } => {
-                let told = error.explain();
-                let remedy = told.remedy.clone();
-                let told = told.file(path);
-                match remedy {
-                    Some(_) => told,
-                    None => told.remedy("train a new run"),
-                }
-            }
+            Self::Skeleton(error) => error.explain(),
             Self::Task(error) => error.explain(),
             Self::Learn(error) => error.explain(),
             Self::Evaluate(error) => error.explain(),
+            Self::InFile { path, error } => {
+                let told = error.explain();
+                match told.file {
+                    Some(_) => told,
+                    None => told.file(path),
+                }
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::error::RunError;
 use super::files;
 use super::folder::Run;
-use crate::evaluate::{Agent, Evaluation, Options, evaluate};
+use crate::evaluate::{Agent, EvaluateError, Evaluation, Options, evaluate};
 use crate::task::Case;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -27,12 +27,18 @@ impl Run {
     /// A run without a policy, or a broken one.
     pub fn evaluate(&self, options: &Options) -> Result<Vec<CaseEvaluation>, RunError> {
         let controller = self.controller()?;
+        // What the agent can't do is the policy's fault; what was asked for isn't.
+        let policy = self.dir().join(files::POLICY);
+        let blamed = |error: EvaluateError| match error {
+            EvaluateError::Learn(_) => RunError::in_file(&policy)(error),
+            _ => error.into(),
+        };
         let cases = controller.task().cases().iter().enumerate();
         let one = |(number, case): (usize, &Case)| {
             Ok(CaseEvaluation {
                 motion: case.name.clone(),
                 seconds: case.duration_s.unwrap_or(options.seconds),
-                evaluation: evaluate(&controller, number, options)?,
+                evaluation: evaluate(&controller, number, options).map_err(blamed)?,
             })
         };
         cases.map(one).collect()

@@ -100,7 +100,7 @@ impl Run {
             plan: config.plan,
             skeleton: Skeleton::from_mjcf(&config.skeleton, &mjcf, Some(&slots))
                 .map_err(|e| e.in_files(&dir.join(files::SKELETON), &dir.join(files::SLOTS)))
-                .map_err(RunError::in_skeleton(&dir.join(files::SKELETON)))?,
+                .map_err(RunError::in_file(&dir.join(files::SKELETON)))?,
             motions,
         })
     }
@@ -160,12 +160,13 @@ impl Run {
                 mut tensors,
                 ..
             } = checkpoint;
-            trainer.restore(TrainerState {
+            let state = TrainerState {
                 iteration,
                 learner,
                 normalizer,
                 starts: tensors.remove(STARTS).unwrap_or_default(),
-            })?;
+            };
+            trainer.restore(state).map_err(RunError::in_file(&path))?;
         }
         Ok(trainer)
     }
@@ -266,10 +267,11 @@ impl Run {
         let details: PolicyDetails =
             serde_json::from_value(file.details).map_err(|e| corrupt(&path, e))?;
         let skeleton = Skeleton::from_mjcf(&details.skeleton, &details.mjcf, Some(&details.slots))
-            .map_err(RunError::in_skeleton(&path))?;
-        let task = build(&details.task, &skeleton, &self.motions)?;
+            .map_err(RunError::in_file(&path))?;
+        let task =
+            build(&details.task, &skeleton, &self.motions).map_err(RunError::in_file(&path))?;
         let (spec, parameters) = (file.spec, file.parameters);
-        Ok(Controller::new(spec, parameters, &file.normalizer, task)?)
+        Controller::new(spec, parameters, &file.normalizer, task).map_err(RunError::in_file(&path))
     }
 
     /// Drops the metrics of iterations after the checkpoint, which will be done again.
