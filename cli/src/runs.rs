@@ -25,8 +25,8 @@ pub fn claim(name: &str) -> Outcome<Claim> {
             1 => runs.join(name),
             _ => runs.join(format!("{name}-{number}")),
         };
-        match Claim::on(folder) {
-            Err(error) if error.is_taken() => number += 1,
+        match Claim::on(&folder) {
+            Err(error) if error.is_taken(&folder) => number += 1,
             claim => return Ok(claim?),
         }
     }

@@ -134,9 +134,11 @@ fn make(dir: &Path) -> Result<Vec<PathBuf>, RunError> {
 
 fn unmade(dir: &Path, source: io::Error) -> RunError {
     match source.kind() {
-        // Some part of the path is a file.
+        // Some part of the path is a file, or a link that leads nowhere.
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
-            RunError::NoFolder(dir.to_owned())
+            let mut parts = dir.ancestors();
+            let file = parts.find(|part| part.symlink_metadata().is_ok());
+            RunError::NoFolder(file.unwrap_or(dir).to_owned())
         }
         _ => RunError::Write {
             path: dir.to_owned(),
@@ -202,8 +204,10 @@ mod tests {
             Err(RunError::NotEmpty(_))
         ));
         let file = folder.path().join("eval.json");
-        for dir in [file.clone(), file.join("run")] {
-            assert!(matches!(Claim::on(dir), Err(RunError::NoFolder(_))));
+        for dir in [file.clone(), file.join("run"), file.join("runs/run")] {
+            let error = Claim::on(&dir).expect_err("a file is in the way");
+            assert!(matches!(&error, RunError::NoFolder(found) if *found == file));
+            assert_eq!(error.is_taken(&dir), dir == file);
         }
         Run::discard(folder.path().join("missing"));
         assert_eq!(fs::read_to_string(&file).expect("read"), "mine");

@@ -30,7 +30,7 @@ pub enum RunError {
     Exists(PathBuf),
     /// The folder of a new run holds other files.
     NotEmpty(PathBuf),
-    /// The folder of a new run is a file, or lies in one.
+    /// A file where a folder is needed for a new run.
     NoFolder(PathBuf),
     /// Another process trains the run, or is making one in the folder.
     Held {
@@ -111,12 +111,13 @@ impl RunError {
         }
     }
 
-    /// Whether the folder for a new run is in use, so that another one has to be found.
-    pub fn is_taken(&self) -> bool {
-        matches!(
-            self,
-            Self::Exists(_) | Self::NotEmpty(_) | Self::NoFolder(_) | Self::Held { .. }
-        )
+    /// Whether `dir`, the folder for a new run, is in use, so that another one beside it has to be found.
+    pub fn is_taken(&self, dir: &Path) -> bool {
+        match self {
+            Self::Exists(_) | Self::NotEmpty(_) | Self::Held { .. } => true,
+            Self::NoFolder(file) => file == dir,
+            _ => false,
+        }
     }
 
     /// Whether a setting of the plan is at fault, so that the caller should say where it came from.
@@ -156,7 +157,7 @@ impl Explain for RunError {
             )
             .file(path)
             .remedy_by(Parameter::Output, "choose a new or an empty folder"),
-            Self::NoFolder(path) => Explanation::input("this is a file, and a run is a folder")
+            Self::NoFolder(path) => Explanation::input("this is not a folder, and a run is one")
                 .file(path)
                 .remedy_by(Parameter::Output, "choose another folder"),
             Self::Held { path, holder } => {

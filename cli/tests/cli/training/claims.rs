@@ -132,15 +132,21 @@ fn a_run_wants_a_folder_of_its_own() {
     for (out, cause) in [
         (".", "holds other files"),
         ("/", "holds other files"),
-        ("eval.json", "this is a file"),
-        ("eval.json/run", "this is a file"),
+        ("eval.json", "this is not a folder"),
     ] {
         let message = train(out)["message"].to_string();
         assert!(message.contains(cause), "{message}");
     }
+    // The file in the way is named, not what would lie in it.
+    let line = ["train", "sway.txt", "--preset", "small.json"];
+    let inside = [&line[..], &["--out", "eval.json/run"]].concat();
+    bench.error_about("eval.json", &inside, 2);
     assert_eq!(object(&bench, "eval.json"), Value::Null);
     let after = std::fs::read_dir(bench.path(".")).expect("listed").count();
     assert_eq!(before, after, "nothing was added");
+    bench.write("runs", b"");
+    bench.error_about("runs", &line, 2);
+    std::fs::remove_file(bench.path("runs")).expect("removed");
     // An empty folder will do.
     std::fs::create_dir(bench.path("run")).expect("a folder");
     bench.mimic(&SMALL).assert().success();
