@@ -3,6 +3,10 @@
 //! Every error type of the library implements [`Explain`]. Its message is its [`Explanation`], written in one line; whoever
 //! shows errors in another way (as JSON, or with the name of the flag to change) takes the parts.
 
+mod near;
+
+pub use near::{did_you_mean, meant, nearest};
+
 use std::fmt;
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ use crate::failure::{Failure, Outcome};
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, ValueEnum};
 use mimic::clip::LoopMode;
-use mimic::explain::plain;
+use mimic::explain::{did_you_mean, plain};
 use mimic::humanoid::Slot;
 use mimic::import::{Options, UpAxis};
 use mimic::skeleton::Skeleton;
@@ -165,18 +165,19 @@ pub fn frame_rate(text: &str) -> Result<f64, String> {
 
 /// A slot of the joint map with a number, as `head=3`.
 fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
-    let known = || Slot::ALL.map(Slot::name).join(", ");
+    let known = Slot::ALL.map(Slot::name);
+    let unknown = |name: &str| match did_you_mean(name, known) {
+        Some(question) => format!("there is no slot `{name}`; {question}"),
+        None => format!(
+            "there is no slot `{name}`; the slots are {}",
+            known.join(", ")
+        ),
+    };
     let (name, weight) = text
         .split_once('=')
         .ok_or("give a slot and its weight, e.g. head=3")?;
     let slot = Slot::ALL.into_iter().find(|slot| slot.name() == name);
-    let slot = slot.ok_or_else(|| {
-        format!(
-            "there is no slot `{}`; the slots are {}",
-            plain(name),
-            known()
-        )
-    })?;
+    let slot = slot.ok_or_else(|| unknown(&plain(name)))?;
     let weight = weight.parse().map_err(|_| "the weight is not a number")?;
     Ok((slot, weight))
 }

@@ -2,6 +2,7 @@
 
 use crate::args::Talk;
 use crate::failure::Failure;
+use crate::other_names;
 use crate::printer;
 use crate::verbs::Verb;
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -61,23 +62,32 @@ pub struct Cli {
 
 /// Reads the command line. Help and the version are printed and end the program well; a wrong line ends it with 2.
 pub fn parse() -> Result<Cli, ExitCode> {
-    Cli::try_parse().map_err(|error| {
+    Cli::try_parse().map_err(|mut error| {
         if !error.use_stderr()
             || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
         {
             // If even this cannot be printed, nobody is left to tell.
             error.print().ok();
+            if error.use_stderr() && wants_json() {
+                let failure = Failure::user("there is no command");
+                printer::json_error(&failure.with_remedy("see `mimic --help`"));
+            }
             return (error.exit_code() as u8).into();
         }
         let arguments: Vec<_> = std::env::args_os().collect();
+        other_names::explain(&mut error, &Cli::command(), &arguments);
         let failure = usage(&error.render().to_string(), &arguments);
         printer::usage_error(&failure);
-        // The flags could not be read, so `--json` is looked for by itself.
-        if arguments.iter().any(|argument| argument == "--json") {
+        if wants_json() {
             printer::json_error(&failure);
         }
         failure.code().into()
     })
+}
+
+/// Whether errors are JSON. The flags could not be read, so `--json` is looked for by itself.
+fn wants_json() -> bool {
+    std::env::args_os().any(|argument| argument == "--json")
 }
 
 /// What is wrong with a command line, from what clap says about it: the cause in the first paragraph, then its tips. One of
@@ -86,16 +96,22 @@ fn usage(said: &str, arguments: &[OsString]) -> Failure {
     let cause = said.split("\n\n").next().unwrap_or(said);
     let cause = cause.strip_prefix("error: ").unwrap_or(cause);
     let words: Vec<&str> = cause.split_whitespace().collect();
+    let cause = words.join(" ");
+    // A value's own reader may know what was meant.
+    let (cause, question) = match cause.split_once("; did you mean ") {
+        Some((cause, meant)) => (cause, Some(format!("did you mean {meant}"))),
+        None => (cause.as_str(), None),
+    };
     let tips: Vec<&str> = said
         .lines()
         .filter_map(|line| line.trim().strip_prefix("tip: "))
         .filter(|tip| !tip.starts_with("to pass "))
         .collect();
-    let remedy = match tips.is_empty() {
+    let remedy = question.unwrap_or_else(|| match tips.is_empty() {
         true => format!("see `{} --help`", named_verb(arguments)),
         false => tips.join("; "),
-    };
-    Failure::user(words.join(" ")).with_remedy(remedy)
+    });
+    Failure::user(cause).with_remedy(remedy)
 }
 
 /// `mimic VERB` for the first argument that is a verb, else `mimic`.

@@ -32,6 +32,11 @@ impl ClipReport {
         }
     }
 
+    /// The clip's file.
+    pub fn file(&self) -> &str {
+        &self.clip
+    }
+
     /// What import or edit found wrong with it.
     pub fn problems(&self) -> &[Problem] {
         &self.problems

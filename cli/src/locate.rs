@@ -2,6 +2,8 @@
 
 use crate::failure::{Failure, Outcome};
 use mimic::run::files;
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -25,6 +27,9 @@ pub const RUNS: &str = "runs";
 
 /// How many names an error message lists.
 const NAMES_SHOWN: usize = 8;
+
+/// Most files of a folder that are compared with a name that was not found: a moment's work in the largest folders.
+const MOST_COMPARED: usize = 10_000;
 
 /// The file that `wanted` means: a path, or a name in the library with one of `extensions`, the first before the others.
 pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathBuf> {
@@ -144,6 +149,37 @@ pub fn is_run(path: &Path) -> bool {
     path.join(files::CONFIG).is_file()
 }
 
+/// The runs in a folder, by name, and what is left of runs: folders with any of a run's own files in it.
+pub fn runs(folder: &Path) -> Vec<PathBuf> {
+    let own = [
+        files::CONFIG,
+        files::CHECKPOINT,
+        files::POLICY,
+        files::METRICS,
+    ];
+    let holds = |path: &PathBuf| own.iter().any(|file| path.join(file).exists());
+    let mut found: Vec<PathBuf> = entries(folder).filter(holds).collect();
+    found.sort();
+    found
+}
+
+/// The names that stand for files of the library, in order.
+pub fn names(library: &Path, extensions: &[&str]) -> Vec<String> {
+    let fits = |path: &PathBuf| extensions.iter().any(|e| has_extension(path, e));
+    let files = entries(library).filter(fits);
+    let names = files.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()));
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// When a run learned last; before its first checkpoint, when it was made.
+pub fn run_time(run: &Path) -> Option<SystemTime> {
+    let files = [files::CHECKPOINT, files::METRICS, files::CONFIG];
+    files.iter().find_map(|file| modified(&run.join(file)))
+}
+
 /// The run in `runs/` that learned last. One that was never saved has nothing to show.
 pub fn newest_run() -> Option<PathBuf> {
     let learned = |path: &PathBuf| modified(&path.join(files::CHECKPOINT));
@@ -174,7 +210,7 @@ fn modified(path: &Path) -> Option<SystemTime> {
     fs::metadata(path).and_then(|m| m.modified()).ok()
 }
 
-fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> {
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let entries = fs::read_dir(folder).into_iter().flatten();
     entries.filter_map(|entry| Some(entry.ok()?.path()))
 }
@@ -185,33 +221,123 @@ fn is_name(path: &Path) -> bool {
 }
 
 fn absent(wanted: &Path, library: &Path, extensions: &[&str]) -> Failure {
-    if !is_name(wanted) {
-        return Failure::input(wanted, "no such file").with_remedy("check the path");
-    }
     let fits = |path: &PathBuf| extensions.iter().any(|e| has_extension(path, e));
-    let known = listing(entries(library).filter(fits));
+    let beside = beside(wanted).filter(fits);
+    if !is_name(wanted) {
+        let near = meant(wanted, beside);
+        return Failure::input(wanted, "no such file")
+            .with_remedy(near.unwrap_or_else(|| "check the path".to_owned()));
+    }
+    let known: Vec<PathBuf> = entries(library).filter(fits).collect();
+    let names = known
+        .iter()
+        .filter_map(|path| Some(path.file_stem()?.into()));
+    let near = meant(wanted, beside.chain(names));
     let cause = format!(
         "no such file here, nor one of that name in the library `{}`",
         library.display()
     );
-    let remedy = match known {
-        Some(known) => format!("give a path, or a name from the library: {known}"),
-        None => "give a path, or the folder of your clips with `--library DIR`".into(),
+    let remedy = match (near, listing(known.into_iter())) {
+        (Some(near), _) => near,
+        (None, Some(known)) => format!("give a path, or a name from the library: {known}"),
+        (None, None) => "give a path, or the folder of your clips with `--library DIR`".into(),
     };
     Failure::input(wanted, cause).with_remedy(remedy)
 }
 
-fn absent_run(wanted: &Path) -> Failure {
-    let known = listing(entries(Path::new(RUNS)).filter(|path| is_run(path)));
-    let remedy = match known {
-        Some(known) => format!("choose one of the runs: {known}"),
-        None => "make a run with `mimic train CLIP`".into(),
+/// The failure of a command whose run doesn't exist.
+pub fn absent_run(wanted: &Path) -> Failure {
+    let runs: Vec<PathBuf> = runs(Path::new(RUNS))
+        .into_iter()
+        .filter(|path| is_run(path))
+        .collect();
+    let names = runs
+        .iter()
+        .filter_map(|path| Some(path.file_name()?.into()));
+    let near = match is_name(wanted) {
+        true => meant(
+            wanted,
+            names.chain(beside(wanted).filter(|path| is_run(path))),
+        ),
+        false => meant(wanted, beside(wanted).filter(|path| is_run(path))),
+    };
+    let remedy = match (near, listing(runs.iter().cloned())) {
+        (Some(near), _) => near,
+        (None, Some(known)) => format!("choose one of the runs: {known}"),
+        (None, None) => "make a run with `mimic train CLIP`".into(),
     };
     let cause = match wanted.is_file() {
         true => "this is a file, and a run is a folder".to_owned(),
         false => format!("there is no run here or in `{RUNS}/`"),
     };
     Failure::input(wanted, cause).with_remedy(remedy)
+}
+
+/// The failure of a command that takes runs beside files, and whose input is neither: a run that was probably meant counts
+/// more than a file.
+pub fn or_run(wanted: Option<&Path>, failure: Failure) -> Failure {
+    let absent = wanted.filter(|wanted| is_name(wanted) && !wanted.exists());
+    let runs = runs(Path::new(RUNS)).into_iter();
+    let names = runs.filter_map(|path| path.file_name().map(PathBuf::from));
+    match absent.and_then(|wanted| meant(wanted, names)) {
+        Some(meant) => failure.with_remedy(meant),
+        None => failure,
+    }
+}
+
+/// What was probably meant by a preset that doesn't exist: one of these names, a plan in a file, or a run.
+pub fn meant_preset(
+    wanted: &Path,
+    names: impl IntoIterator<Item = &'static str>,
+) -> Option<String> {
+    let files = beside(wanted).filter(|path| has_extension(path, "json") || is_run(path));
+    let runs = runs(Path::new(RUNS)).into_iter();
+    let runs = runs.filter_map(|path| path.file_name().map(PathBuf::from));
+    let names = names.into_iter().map(PathBuf::from);
+    meant(wanted, names.chain(runs).chain(files))
+}
+
+/// The question whether a file of this kind beside `wanted`, which doesn't exist, was meant.
+pub fn meant_file(wanted: &Path, extension: &str) -> Option<String> {
+    if wanted.exists() {
+        return None;
+    }
+    meant(
+        wanted,
+        beside(wanted).filter(|path| has_extension(path, extension)),
+    )
+}
+
+/// What lies where `wanted` was looked for, as paths that can be typed.
+fn beside(wanted: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    let folder = wanted.parent().unwrap_or(Path::new("")).to_path_buf();
+    let read = match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => &folder,
+    };
+    let entries = entries(read).take(MOST_COMPARED);
+    entries.filter_map(move |path| Some(folder.join(path.file_name()?)))
+}
+
+/// The question whether the most similar of these paths was meant; their folders are that of `wanted`, or are left out.
+/// A name without its extension counts as well.
+fn meant(wanted: &Path, known: impl Iterator<Item = PathBuf>) -> Option<String> {
+    let name = wanted.file_name()?.to_string_lossy();
+    let with_stem = known.flat_map(|path| {
+        let name = |part: Option<&OsStr>| part.map(|name| name.to_string_lossy().into_owned());
+        let names = [name(path.file_name()), name(path.file_stem())];
+        names
+            .into_iter()
+            .flatten()
+            .map(move |name| (name, path.clone()))
+    });
+    // The first of one name is what a command would take.
+    let mut paths = BTreeMap::new();
+    for (name, path) in with_stem {
+        paths.entry(name).or_insert(path);
+    }
+    let found = mimic::explain::meant(&name, paths.keys())?;
+    Some(format!("did you mean `{}`?", paths[&found].display()))
 }
 
 /// The first few names of files or folders, without extensions, in a sentence.

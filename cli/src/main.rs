@@ -1,15 +1,18 @@
 //! `mimic`: from an animation clip to a physics character that performs it.
 
+mod amount;
 mod args;
 mod checks;
 mod cli;
 mod clip_report;
 mod failure;
 mod locate;
+mod other_names;
 mod output;
 mod plot;
 mod prepare;
 mod printer;
+mod progress;
 mod recording;
 mod runs;
 mod verbs;
@@ -21,6 +24,9 @@ use printer::Printer;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    if let Some(code) = verbs::completions::answer(Cli::command) {
+        return code;
+    }
     let cli = match cli::parse() {
         Ok(cli) => cli,
         Err(code) => return code,

@@ -4,6 +4,7 @@ use crate::args::{ImportArgs, RetargetArgs};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
+use crate::progress;
 use mimic::clip::{Clip, Problem};
 use mimic::file::text_at_most;
 use mimic::humanoid::HumanoidMap;
@@ -21,6 +22,8 @@ pub struct Prepared {
     pub skeleton: Skeleton,
     /// How long retargeting took; `None` for a motion that was read from a file.
     pub seconds: Option<f64>,
+    /// What was found on the way.
+    pub problems: Vec<Problem>,
 }
 
 /// A file, and how to make a motion of it.
@@ -62,13 +65,29 @@ impl Preparation {
         locate::has_extension(&self.file, "motion")
     }
 
-    /// Reads the motion, or makes it.
+    /// Reads the motion, or makes it, and says what was found on the way.
     pub fn run(&self, printer: &Printer) -> Outcome<Prepared> {
+        let prepared = self.prepare(printer)?;
+        printer.problems(&prepared.problems);
+        Ok(prepared)
+    }
+
+    /// The same for several files, of which what repeats is said once.
+    pub fn run_all(all: &[Self], printer: &Printer) -> Outcome<Vec<Prepared>> {
+        let prepared = all.iter().map(|one| one.prepare(printer));
+        let prepared: Vec<Prepared> = prepared.collect::<Outcome<_>>()?;
+        let files = all.iter().map(|one| one.file.display().to_string());
+        let problems = prepared.iter().map(|one| one.problems.as_slice());
+        printer.problems_of(&files.zip(problems).collect::<Vec<_>>());
+        Ok(prepared)
+    }
+
+    fn prepare(&self, printer: &Printer) -> Outcome<Prepared> {
         if self.is_motion() {
             return self.load(printer);
         }
-        let clip = self.clip()?;
-        printer.problems(&clip.problems);
+        let what = format!("reading `{}`", self.file.display());
+        let clip = progress::during(printer, &what, |_| self.clip())?;
         let skeleton = self.retarget.skeleton()?;
         let map = self.map(&clip)?;
         printer.note(format!(
@@ -82,17 +101,21 @@ impl Preparation {
             weights,
             to_perform: self.to_perform,
         };
-        let done = retarget::retarget(&clip, &skeleton, &options)
-            .map_err(|e| Failure::in_file(&self.file, e))?;
+        let what = format!("retargeting `{}`", self.file.display());
+        let done = progress::during(printer, &what, |share| {
+            retarget::retarget_watched(&clip, &skeleton, &options, &|done| share.set(done))
+        });
+        let done = done.map_err(|e| Failure::in_file(&self.file, e))?;
         let new = |problem: &&Problem| !clip.problems.contains(problem);
-        let found: Vec<_> = done.report.problems.iter().filter(new).cloned().collect();
-        printer.problems(&found);
+        let found = done.report.problems.iter().filter(new).cloned();
+        let problems = clip.problems.iter().cloned().chain(found).collect();
         let (mut motion, seconds) = (done.motion, Some(done.seconds));
         motion.name = self.name();
         Ok(Prepared {
             motion,
             skeleton,
             seconds,
+            problems,
         })
     }
 
@@ -118,6 +141,7 @@ impl Preparation {
             motion,
             skeleton,
             seconds: None,
+            problems: Vec::new(),
         })
     }
 
@@ -150,8 +174,13 @@ impl Preparation {
         let Some(path) = &self.retarget.map else {
             return Ok(None);
         };
-        let text = text_at_most(path, HumanoidMap::MOST_BYTES)
-            .map_err(|e| Failure::unreadable(path, &e))?;
+        let text = text_at_most(path, HumanoidMap::MOST_BYTES).map_err(|e| {
+            let failure = Failure::unreadable(path, &e);
+            match locate::meant_file(path, "json") {
+                Some(meant) => failure.with_remedy(meant),
+                None => failure,
+            }
+        })?;
         let map =
             HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::in_file(path, e))?;
         Ok(Some(map))

@@ -7,6 +7,7 @@ use mimic::clip::{Problem, Severity};
 use mimic::explain::{is_plain, plain};
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
 
@@ -125,6 +126,33 @@ impl Printer {
                 Severity::Note => self.detail(format!("note: {line}")),
                 Severity::Warning | Severity::Error => self.warn(line),
             }
+        }
+    }
+
+    /// Says what was found in several files. A warning that repeats is said once, for the first of them, with a count.
+    pub fn problems_of(&self, files: &[(String, &[Problem])]) {
+        if let [(_, only)] = files {
+            return self.problems(only);
+        }
+        let all = files
+            .iter()
+            .flat_map(|(file, problems)| problems.iter().map(move |p| (file, p)));
+        let (notes, warnings): (Vec<_>, Vec<_>) =
+            all.partition(|(_, problem)| problem.severity == Severity::Note);
+        for (file, Problem { id, message, .. }) in notes {
+            self.detail(format!("note: `{file}`: {message} [{id}]"));
+        }
+        let mut said = BTreeSet::new();
+        for (file, Problem { id, message, .. }) in &warnings {
+            if !said.insert(id) {
+                continue;
+            }
+            let more = warnings.iter().filter(|(_, p)| p.id == *id).count() - 1;
+            let more = match more {
+                0 => String::new(),
+                more => format!(", and {more} more like it"),
+            };
+            self.warn(format!("`{file}`: {message} [{id}]{more}"));
         }
     }
 

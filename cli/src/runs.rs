@@ -4,6 +4,7 @@ use crate::args::positive;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
+use crate::progress;
 use crate::recording::Recording;
 use mimic::evaluate::{Agent, EvaluateError, Options, perform, perform_sequence};
 use mimic::run::{CaseEvaluation, Claim, Controller, Run, files};
@@ -44,7 +45,9 @@ pub fn evaluate(run: &Run, options: &Options, printer: &Printer) -> Outcome<Vec<
         names.join(", "),
         options.episodes
     ));
-    Ok(run.evaluate(options)?)
+    let what = format!("evaluating {}", names.join(", "));
+    let results = progress::during(printer, &what, |_| run.evaluate(options));
+    Ok(results?)
 }
 
 /// The disturbances under which a run is evaluated: those of its training, or if it had none but they are `asked` for, the

@@ -4,11 +4,15 @@ use super::agent::{Agent, EvaluateError};
 use super::episode::{check_steps, perform};
 use crate::sim::LANES;
 use crate::task::{
-    Episode, EpisodeStart, Failure, Good, Measure, Perturbations, StartState, Task, Unit, mean,
+    Episode, EpisodeStart, Failure, Good, Measure, Performance, Perturbations, StartState, Task,
+    Unit, Verdict, mean,
 };
 use rayon::prelude::*;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
+
+/// Survival that is good enough: docs/results.md asks it of the hardest skills, and all skills there reach it.
+const SURVIVAL: f64 = 0.95;
 
 /// What to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +44,8 @@ pub struct Evaluation {
     pub measures: Vec<Measure>,
     /// The episodes that failed.
     pub failures: Vec<FailedEpisode>,
+    /// Whether these episodes show that the case is learned, as the task sees it.
+    pub verdict: Verdict,
     /// One more episode, from standing still in the rest pose.
     pub from_rest: Disturbed,
     /// The same phases again, disturbed. Where the reference follows an agent that was shoved, errors are measured from there, and
@@ -151,10 +157,18 @@ fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
             failures: failures(episodes),
         }
     };
+    let (measured, failed) = (measures(task, phases), failures(phases));
+    let starts: Vec<f64> = failed.iter().map(|episode| episode.start).collect();
+    let verdict = task.verdict(&Performance {
+        episodes: count,
+        measures: &measured,
+        failed: &starts,
+    });
     Evaluation {
         episodes: count,
-        measures: measures(task, phases),
-        failures: failures(phases),
+        measures: measured,
+        failures: failed,
+        verdict,
         from_rest: more(rest),
         perturbed: (!disturbed.is_empty()).then(|| more(disturbed)),
     }
@@ -173,13 +187,15 @@ fn measures(task: &dyn Task, episodes: &[Episode]) -> Vec<Measure> {
     let mut all = vec![
         Measure::new("survival", "survival", survival)
             .good(Good::High, Unit::Share)
+            .enough(SURVIVAL)
             .holding_disturbed(),
         Measure::new(
             "survival_from_start",
             "survival, from the first frame",
             first,
         )
-        .good(Good::High, Unit::Share),
+        .good(Good::High, Unit::Share)
+        .enough(SURVIVAL),
     ];
     all.extend(task.measures(episodes));
     all.push(
@@ -208,6 +224,8 @@ impl Serialize for Evaluation {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         fields(&mut map, self.episodes, &self.measures, &self.failures)?;
+        map.serialize_entry("learned", &self.verdict.learned)?;
+        map.serialize_entry("verdict", &self.verdict.text)?;
         map.serialize_entry("from_rest", &self.from_rest)?;
         map.serialize_entry("perturbed", &self.perturbed)?;
         map.end()

@@ -1,7 +1,7 @@
 //! Why a joint tree can't be used as a humanoid.
 
 use super::Slot;
-use crate::explain::{Explain, Explanation, Parameter, explained};
+use crate::explain::{Explain, Explanation, Parameter, did_you_mean, explained};
 
 /// Why no humanoid was found in a joint tree, or why a joint map doesn't fit it.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +96,9 @@ impl Explain for Error {
             .remedy("write it as {\"hips\": \"pelvis\", …}"),
             Self::UnknownSlot { slot } => {
                 Explanation::input(format!("the joint map has an unknown slot `{slot}`"))
-                    .remedy(format!("use one of {}", names(&Slot::ALL)))
+                    .remedy(did_you_mean(slot, Slot::ALL.map(Slot::name)).unwrap_or_else(|| {
+                        format!("use one of {}", names(&Slot::ALL))
+                    }))
             }
             Self::UnknownJoint {
                 slot,

@@ -37,6 +37,8 @@ pub enum ErrorKind {
         wanted: String,
         /// The takes of the file, with their numbers, at most eight of them.
         takes: String,
+        /// The take that was probably meant.
+        meant: Option<String>,
     },
     /// A part of the take without a frame in it.
     EmptyTrim {
@@ -125,8 +127,17 @@ impl ErrorKind {
             Self::NoJoints => {
                 wrong("the file holds no joints".to_owned()).remedy("export it with its skeleton")
             }
-            Self::UnknownTake { wanted, takes } => wrong(format!("no take is called `{wanted}`"))
-                .remedy_by(Parameter::Take, format!("choose one of {takes}")),
+            Self::UnknownTake {
+                wanted,
+                takes,
+                meant,
+            } => wrong(format!("no take is called `{wanted}`")).remedy_by(
+                Parameter::Take,
+                match meant {
+                    Some(meant) => format!("did you mean `{meant}`? choose one of {takes}"),
+                    None => format!("choose one of {takes}"),
+                },
+            ),
             Self::EmptyTrim {
                 take,
                 from,

@@ -4,6 +4,7 @@ use super::error::ErrorKind;
 use super::names::first_few;
 use super::scene::Scene;
 use crate::clip::Problem;
+use crate::explain::meant;
 use nalgebra::Matrix4;
 
 /// At how many times a take is evaluated to see whether anything moves in it. Chosen: a motion that is the same pose at nine
@@ -29,6 +30,7 @@ pub(crate) fn choose(
     let unknown = |wanted: &str| ErrorKind::UnknownTake {
         wanted: wanted.to_owned(),
         takes: list(scene),
+        meant: meant(wanted, scene.takes().iter().map(|take| &take.name)),
     };
     let (take, note) = match wanted {
         Some(wanted) => (find(scene, wanted).ok_or_else(|| unknown(wanted))?, None),

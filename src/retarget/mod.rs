@@ -89,6 +89,19 @@ pub fn retarget(
     skeleton: &Skeleton,
     options: &Options,
 ) -> Result<Retargeted, RetargetError> {
+    retarget_watched(clip, skeleton, options, &|_| ())
+}
+
+/// The same, and tells `progress` now and then which share of the work is done, from 0 to 1. A minute of motion takes seconds.
+///
+/// # Errors
+/// As [`retarget`].
+pub fn retarget_watched(
+    clip: &Clip,
+    skeleton: &Skeleton,
+    options: &Options,
+    progress: &dyn Fn(f64),
+) -> Result<Retargeted, RetargetError> {
     let start = Instant::now();
     let model = Model::new(skeleton);
     let input = input::prepare(clip, skeleton, options)?;
@@ -106,6 +119,7 @@ pub fn retarget(
         cycle: seam.map(|seam| &seam.cycle),
         fps: setting.fps,
         to_perform: options.to_perform,
+        progress,
     };
     let fitted = fit.run(planted.goals);
     // All that the stages found, in their order.

@@ -198,18 +198,6 @@ impl Run {
             normalizer,
             starts,
         } = trainer.state();
-        let policy = PolicyFile {
-            spec: learner.spec.clone(),
-            parameters: learner.parameters.clone(),
-            normalizer: normalizer.clone(),
-            details: json!(PolicyDetails {
-                task: self.plan.task.clone(),
-                skeleton: self.skeleton.name.clone(),
-                mjcf: self.skeleton.mjcf.clone(),
-                slots: self.skeleton.slots_json(),
-                observation: trainer.task().observation().to_vec(),
-            }),
-        };
         let checkpoint = Checkpoint {
             iteration,
             samples: trainer.samples(),
@@ -218,6 +206,31 @@ impl Run {
             tensors: [(STARTS.to_owned(), starts)].into(),
         };
         checkpoint.save(self.dir.join(files::CHECKPOINT))?;
+        self.save_policy(trainer)
+    }
+
+    /// Saves the policy alone, in one step.
+    ///
+    /// # Errors
+    /// A folder that can't be written; the last good policy stays.
+    pub fn save_policy(&self, trainer: &Trainer) -> Result<(), RunError> {
+        let TrainerState {
+            learner,
+            normalizer,
+            ..
+        } = trainer.state();
+        let policy = PolicyFile {
+            spec: learner.spec,
+            parameters: learner.parameters,
+            normalizer,
+            details: json!(PolicyDetails {
+                task: self.plan.task.clone(),
+                skeleton: self.skeleton.name.clone(),
+                mjcf: self.skeleton.mjcf.clone(),
+                slots: self.skeleton.slots_json(),
+                observation: trainer.task().observation().to_vec(),
+            }),
+        };
         Ok(policy.save(self.dir.join(files::POLICY))?)
     }
 

@@ -130,10 +130,28 @@ impl Session {
     /// # Errors
     /// A folder that can't be written; the last good files stay.
     pub fn save(&self) -> Result<(), RunError> {
+        self.remove_results();
+        self.run.save(&self.trainer)
+    }
+
+    /// Saves the policy alone, for a session that has no time to finish its round. It can be evaluated and replayed. The run
+    /// goes on from its last checkpoint, or from its beginning, and does the round again, to the same bits.
+    ///
+    /// # Errors
+    /// A folder that can't be written; the last good policy stays.
+    pub fn save_policy(&self) -> Result<(), RunError> {
+        self.remove_results();
+        if !self.run.is_saved() {
+            let (settings, task) = (self.trainer.settings().clone(), self.trainer.task().clone());
+            self.run.save(&Trainer::new(settings, task)?)?;
+        }
+        self.run.save_policy(&self.trainer)
+    }
+
+    fn remove_results(&self) {
         for outdated in [files::EVALUATION, files::RECORDING] {
             std::fs::remove_file(self.run.dir().join(outdated)).ok();
         }
-        self.run.save(&self.trainer)
     }
 
     /// Whether the run's policy file is whole and holds what was learned last. It can be lost, damaged, or older than the

@@ -1,7 +1,7 @@
 //! What can be wrong with the description of a character.
 
 use super::Skeleton;
-use crate::explain::{Explain, Explanation, Parameter, explained};
+use crate::explain::{Explain, Explanation, Parameter, did_you_mean, explained};
 use crate::file::unread;
 use std::path::{Path, PathBuf};
 
@@ -92,7 +92,9 @@ impl Explain for SkeletonError {
                 told.remedy_by(Parameter::Skeleton, advice)
             }
             Self::UnknownName { name } => {
-                let advice = format!("use one of {}, or an MJCF file (.xml)", built_in());
+                let advice = did_you_mean(name, Skeleton::built_in()).unwrap_or_else(|| {
+                    format!("use one of {}, or an MJCF file (.xml)", built_in())
+                });
                 Explanation::input(format!("no skeleton is called `{name}`"))
                     .remedy_by(Parameter::Skeleton, advice)
             }

@@ -9,6 +9,7 @@ use super::error::TaskError;
 use super::model::CharacterModel;
 use super::starts::{Moment, StartDistribution};
 use super::step::{Block, Case, EpisodeStart, Input, Purpose, ReferenceState, Step};
+use super::verdict::{Performance, Verdict};
 use crate::sim::{Diverged, Target, World};
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
@@ -57,6 +58,9 @@ pub trait Task: Send + Sync {
 
     /// How well an agent performed in these episodes of one case, beyond what [`crate::evaluate`] measures of every task.
     fn measures(&self, episodes: &[Episode]) -> Vec<Measure>;
+
+    /// Whether an agent that performed one case like this has learned it.
+    fn verdict(&self, found: &Performance) -> Verdict;
 }
 
 /// A world in which one agent performs a task.

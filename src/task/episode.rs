@@ -90,6 +90,8 @@ pub struct Measure {
     pub value: f64,
     /// Which values are good.
     pub good: Good,
+    /// From which value on it is good enough, where one is known. It stands beside where it comes from.
+    pub enough: Option<f64>,
     /// Whether it also means something for an agent that is disturbed or starts from rest, which has more to do than to
     /// perform its task.
     pub holds_disturbed: bool,
@@ -104,6 +106,7 @@ impl Measure {
             unit: Unit::Score,
             value,
             good: Good::Neither,
+            enough: None,
             holds_disturbed: false,
         }
     }
@@ -112,6 +115,27 @@ impl Measure {
     #[must_use]
     pub fn good(self, good: Good, unit: Unit) -> Self {
         Self { unit, good, ..self }
+    }
+
+    /// The same measure, good enough from this value on.
+    #[must_use]
+    pub fn enough(self, value: f64) -> Self {
+        Self {
+            enough: Some(value),
+            ..self
+        }
+    }
+
+    /// Whether it is good enough; what has no such value, or is no number, is not.
+    pub fn is_enough(&self) -> bool {
+        let Some(enough) = self.enough else {
+            return false;
+        };
+        match self.good {
+            Good::High => self.value >= enough,
+            Good::Low => self.value <= enough,
+            Good::Near(_) | Good::Neither => false,
+        }
     }
 
     /// The same measure, which also means something for disturbed agents.

@@ -13,6 +13,7 @@ mod model;
 mod settings;
 mod starts;
 mod step;
+mod verdict;
 
 pub use disturbance::Perturbations;
 pub use dynamics::Dynamics;
@@ -31,3 +32,4 @@ pub use step::{
     Block, Case, EpisodeStart, Failure, Input, MAX_TERMS, Outcome, Purpose, ReferenceState,
     StartState, Step, TermValues, size,
 };
+pub use verdict::{Performance, Verdict};

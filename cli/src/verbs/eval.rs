@@ -9,7 +9,7 @@ use crate::runs;
 use mimic::evaluate::{FailedEpisode, Options};
 use mimic::explain::plain;
 use mimic::run::{CaseEvaluation, Run, RunError};
-use mimic::task::{Measure, Unit};
+use mimic::task::{Good, Measure, Unit};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -23,7 +23,7 @@ The run's own eval.json is written only with the default number of episodes and 
 runs can be compared by it.";
 
 /// Most phases that a line of the table lists.
-const MOST_PHASES: usize = 8;
+const MOST_PHASES: usize = 7;
 
 /// Longest episode, seconds: every frame of every episode is held in memory until all are measured.
 const MOST_SECONDS: f64 = 3600.0;
@@ -88,8 +88,8 @@ impl Args {
         };
         let report = CaseEvaluation::json(&results);
         match kept {
-            Ok(()) => printer.result(&report, || text(&results)),
-            Err(failure) => printer.partial_result(report, || text(&results), failure),
+            Ok(()) => printer.result(&report, || text(&results, None)),
+            Err(failure) => printer.partial_result(report, || text(&results, None), failure),
         }
     }
 }
@@ -149,47 +149,78 @@ fn keep(
 }
 
 /// The first few of the phases from which the agent fails.
-fn failed(failures: &[FailedEpisode], how: &str) -> Option<(String, String)> {
+fn failed(failures: &[FailedEpisode], how: &str) -> Option<Row> {
     let starts = failures.iter().take(MOST_PHASES);
     let mut phases: Vec<String> = starts.map(|f| format!("{:.2}", f.start)).collect();
     if failures.len() > MOST_PHASES {
         phases.push("…".to_owned());
     }
     let name = format!("fails from phase{how}");
-    (!phases.is_empty()).then(|| (name, phases.join(" ")))
+    (!phases.is_empty()).then(|| Row(name, phases.join(" "), String::new()))
 }
 
-/// A table per motion.
-pub fn text(results: &[CaseEvaluation]) -> String {
-    results.iter().map(table).collect()
+/// What the evaluation comes to in a sentence, with `advice` if there is any, and a table per motion.
+pub fn text(results: &[CaseEvaluation], advice: Option<&str>) -> String {
+    let advice = advice.map_or_else(String::new, |advice| format!("; {advice}"));
+    let tables: String = results.iter().map(table).collect();
+    match results {
+        [one] => format!("{}{advice}\n{tables}", one.evaluation.verdict.text),
+        many => {
+            let learned = many.iter().filter(|one| one.evaluation.verdict.learned);
+            let (learned, all) = (learned.count(), many.len());
+            format!("learned {learned} of {all} motions{advice}\n{tables}")
+        }
+    }
 }
+
+/// A line of the table: what was measured, its value, and which values are good.
+struct Row(String, String, String);
 
 fn table(result: &CaseEvaluation) -> String {
     let (name, found) = (&result.motion, &result.evaluation);
-    let row = |m: &Measure| (m.label.to_owned(), value(m));
-    let mut rows: Vec<(String, String)> = found.measures.iter().map(row).collect();
+    let (name, episodes) = (plain(name), found.episodes);
+    let noun = if episodes == 1 { "episode" } else { "episodes" };
+    let heading = format!("{name}, {episodes} {noun}");
+    let row = |m: &Measure| Row(m.label.to_owned(), value(m, m.value), good(m));
+    let mut rows = vec![Row(heading, String::new(), "good".to_owned())];
+    rows.extend(found.measures.iter().map(row));
     let rest = ("from rest", &found.from_rest);
     let disturbed = found.perturbed.iter().map(|p| ("disturbed", p));
     for (how, more) in std::iter::once(rest).chain(disturbed) {
         let shown = |m: &&Measure| ["survival", "mpjpe_local_mm"].contains(&m.name);
-        let row = |m: &Measure| (format!("{}, {how}", m.label), value(m));
+        let row = |m: &Measure| {
+            let label = format!("{}, {how}", m.label);
+            Row(label, value(m, m.value), String::new())
+        };
         rows.extend(more.measures.iter().filter(shown).map(row));
     }
     let perturbed = found.perturbed.iter();
     let perturbed = perturbed.filter_map(|p| failed(&p.failures, ", disturbed"));
     rows.extend(failed(&found.failures, "").into_iter().chain(perturbed));
-    let lines: String = rows
-        .iter()
-        .map(|(name, value)| format!("  {name:38} {value:>12}\n"))
-        .collect();
-    let (name, episodes) = (plain(name), found.episodes);
-    let noun = if episodes == 1 { "episode" } else { "episodes" };
-    format!("{name}, {episodes} {noun}\n{lines}")
+    let line = |(number, Row(name, value, good)): (usize, &Row)| {
+        let indent = if number == 0 { "" } else { "  " };
+        let width = 40 - indent.len();
+        let line = format!("{indent}{name:width$} {value:>12}  {good}");
+        line.trim_end().to_owned() + "\n"
+    };
+    rows.iter().enumerate().map(line).collect()
 }
 
-/// A measure with its unit.
-fn value(measure: &Measure) -> String {
-    let value = measure.value;
+/// Which values of a measure are good.
+fn good(measure: &Measure) -> String {
+    let enough = measure.enough.map(|enough| value(measure, enough));
+    match (measure.good, enough) {
+        (Good::High, Some(enough)) => format!("{enough} or more"),
+        (Good::Low, Some(enough)) => format!("{enough} or less"),
+        (Good::High, None) => "more is better".to_owned(),
+        (Good::Low, None) => "less is better".to_owned(),
+        (Good::Near(goal), _) => format!("near {}", value(measure, goal)),
+        (Good::Neither, _) => String::new(),
+    }
+}
+
+/// A value of a measure with its unit.
+fn value(measure: &Measure, value: f64) -> String {
     match measure.unit {
         Unit::Share => format!("{:.1} %", 100.0 * value),
         Unit::Score => format!("{value:.3}"),

@@ -6,6 +6,7 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::output::{Form, Maker, Output, names_folder, result_path, safe_name};
 use crate::printer::Printer;
+use crate::progress;
 use mimic::explain::plain;
 use mimic::import;
 use serde_json::json;
@@ -58,16 +59,16 @@ impl Args {
         let (mut reports, mut failures) = (Vec::new(), Vec::new());
         for step in &steps {
             bar.set_message(plain(&step.input.display().to_string()));
-            match self.import(step) {
-                Ok(report) => {
-                    bar.suspend(|| printer.problems(report.problems()));
-                    reports.push(report);
-                }
+            match self.import(step, printer) {
+                Ok(report) => reports.push(report),
                 Err(failure) => failures.push((step.input.as_path(), failure)),
             }
             bar.inc(1);
         }
         bar.finish_and_clear();
+        let files = reports.iter().map(|report| report.file().to_owned());
+        let problems = reports.iter().map(ClipReport::problems);
+        printer.problems_of(&files.zip(problems).collect::<Vec<_>>());
         if let ([_], false) = (&steps[..], self.wants_all()) {
             failures.pop().map_or(Ok(()), |(_, failure)| Err(failure))?;
             return reports
@@ -146,7 +147,7 @@ impl Args {
         Ok(numbers.zip(names).collect())
     }
 
-    fn import(&self, step: &Step) -> Outcome<ClipReport> {
+    fn import(&self, step: &Step, printer: &Printer) -> Outcome<ClipReport> {
         let Step {
             input,
             take,
@@ -163,7 +164,8 @@ impl Args {
             mirror: self.mirror,
             ..self.import.options()
         };
-        let clip = import::load(input, &options)?;
+        let what = format!("reading `{}`", input.display());
+        let clip = progress::during(printer, &what, |_| import::load(input, &options))?;
         output.write(|made| Ok(clip.to_bytes(made)?))?;
         Ok(ClipReport::new(output.path(), clip))
     }

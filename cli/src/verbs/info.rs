@@ -1,17 +1,18 @@
 //! `mimic info`: what is in an animation file.
 
+use crate::amount;
 use crate::args::Replace;
 use crate::failure::Outcome;
 use crate::locate;
 use crate::output::{Form, Maker, Output};
 use crate::printer::Printer;
+use crate::progress;
 use mimic::clip::{Clip, Joint, Problem, Severity};
-use mimic::explain::plain;
+use mimic::explain::{Explain, plain};
 use mimic::humanoid::{self, HumanoidMap, Slot};
 use mimic::import::{self, TakeInfo};
 use serde::Serialize;
 use serde_json::json;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -38,12 +39,21 @@ pub struct Args {
 struct Report {
     file: String,
     format: String,
-    takes: Vec<TakeInfo>,
+    takes: Vec<Take>,
     joints: Vec<String>,
     up_axis: String,
     unit_m: f64,
     map: Vec<Row>,
     problems: Vec<Problem>,
+}
+
+/// One take of the file.
+#[derive(Serialize)]
+struct Take {
+    #[serde(flatten)]
+    info: TakeInfo,
+    /// Whether it is read when none is named.
+    default: bool,
 }
 
 /// One slot of the joint map.
@@ -59,7 +69,8 @@ impl Args {
     /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let file = locate::clip(&self.file, library, &locate::CLIPS)?;
-        let (mut report, joints) = look(&file)?;
+        let what = format!("reading `{}`", file.display());
+        let (mut report, joints) = progress::during(printer, &what, |_| look(&file))?;
         let map = match humanoid::map(&joints) {
             Ok(map) => map,
             Err(e) => {
@@ -124,17 +135,39 @@ fn look(file: &Path) -> Outcome<(Report, Vec<Joint>)> {
         return Ok(of_clip(file, clip));
     }
     let found = import::inspect(file)?;
+    let default = found.default_take;
+    let take = |(at, info)| Take {
+        info,
+        default: default == Some(at),
+    };
+    let mut problems = found.problems;
+    if default.is_some() {
+        let more = of_default_take(file);
+        problems.extend(
+            more.into_iter()
+                .filter(|p| !problems.contains(p))
+                .collect::<Vec<_>>(),
+        );
+    }
     let report = Report {
         file: file.display().to_string(),
         format: found.format,
-        takes: found.takes,
+        takes: found.takes.into_iter().enumerate().map(take).collect(),
         joints: names(&found.joints),
         up_axis: found.up_axis,
         unit_m: found.unit_m,
         map: Vec::new(),
-        problems: found.problems,
+        problems,
     };
     Ok((report, found.joints))
+}
+
+/// What importing the default take would say, such as why a frame is left out, or why the take is refused.
+fn of_default_take(file: &Path) -> Vec<Problem> {
+    match import::load(file, &import::Options::default()) {
+        Ok(clip) => clip.problems,
+        Err(error) => vec![Problem::error("not-importable", error.explain().cause)],
+    }
 }
 
 fn of_clip(file: &Path, clip: Clip) -> (Report, Vec<Joint>) {
@@ -147,7 +180,10 @@ fn of_clip(file: &Path, clip: Clip) -> (Report, Vec<Joint>) {
     let report = Report {
         file: file.display().to_string(),
         format: "clip".into(),
-        takes: vec![take],
+        takes: vec![Take {
+            info: take,
+            default: true,
+        }],
         joints: names(&clip.joints),
         up_axis: "+Z".into(),
         unit_m: 1.0,
@@ -175,51 +211,73 @@ pub fn rows(map: &HumanoidMap, joints: &[Joint]) -> Vec<Row> {
 }
 
 fn text(report: &Report) -> String {
-    let mut text = String::new();
-    let Report {
-        file,
-        format,
-        up_axis,
-        unit_m,
-        joints,
-        ..
-    } = report;
-    let joints = joints.len();
-    let head = format!("{file}: {format}, {up_axis} up, {unit_m} m per unit, {joints} joints");
-    line(&mut text, head);
-    section(&mut text, "takes");
-    for (index, take) in report.takes.iter().enumerate() {
-        line(&mut text, take_line(index + 1, take));
-    }
-    section(&mut text, "joint map");
-    for row in &report.map {
-        line(&mut text, map_line(row));
-    }
-    if !report.problems.is_empty() {
-        section(&mut text, "problems");
-    }
-    for Problem {
-        id,
-        severity,
-        message,
-        ..
-    } in &report.problems
-    {
-        let severity = format!("{severity:?}").to_lowercase();
-        line(&mut text, format!("     {severity:8} {id}: {message}"));
-    }
+    let mut text = format!(
+        "{}: {}, {} up, {} m per unit, {} joints\n",
+        report.file,
+        report.format,
+        report.up_axis,
+        amount::digits(report.unit_m),
+        report.joints.len()
+    );
+    let takes = report.takes.iter().enumerate();
+    let several = report.takes.len() > 1;
+    section(
+        &mut text,
+        "takes",
+        takes.map(|(at, take)| take_line(at + 1, take, several)),
+    );
+    section(&mut text, "joint map", report.map.iter().map(map_line));
+    section(
+        &mut text,
+        "problems",
+        report.problems.iter().map(problem_line),
+    );
     text
 }
 
-fn take_line(number: usize, take: &TakeInfo) -> String {
+/// A heading with its lines, or with "none".
+fn section(text: &mut String, title: &str, lines: impl ExactSizeIterator<Item = String>) {
+    *text += &match lines.len() {
+        0 => format!("\n{title}: none\n"),
+        _ => format!("\n{title}\n"),
+    };
+    for line in lines {
+        *text += &plain(line.trim_end());
+        text.push('\n');
+    }
+}
+
+fn take_line(number: usize, take: &Take, several: bool) -> String {
     let TakeInfo {
         name,
         fps,
         frames,
         duration_s,
         ..
-    } = take;
-    format!("{number:>3}  {name:32} {frames:>6} frames  {fps:>6.1} Hz  {duration_s:>7.2} s")
+    } = &take.info;
+    let (fps, duration) = (amount::digits(*fps), amount::digits(*duration_s));
+    // Keys may be farther apart than frames can be counted.
+    let frames = match *frames {
+        usize::MAX => "-".to_owned(),
+        frames => frames.to_string(),
+    };
+    let default = if several && take.default {
+        "  default"
+    } else {
+        ""
+    };
+    format!("{number:>3}  {name:32} {frames:>6} frames  {fps:>6} Hz  {duration:>7} s{default}")
+}
+
+fn problem_line(problem: &Problem) -> String {
+    let Problem {
+        id,
+        severity,
+        message,
+        ..
+    } = problem;
+    let severity = format!("{severity:?}").to_lowercase();
+    format!("     {severity:8} {id}: {message}")
 }
 
 fn map_line(row: &Row) -> String {
@@ -231,14 +289,4 @@ fn map_line(row: &Row) -> String {
     } = row;
     let percent = 100.0 * confidence;
     format!("     {slot:16} {joint:32} {percent:>3.0} %  {reason}")
-}
-
-fn section(text: &mut String, title: &str) {
-    text.push('\n');
-    line(text, title.to_owned());
-}
-
-/// Adds a line, whatever the names in it hold. Writing to a string cannot fail.
-fn line(text: &mut String, line: String) {
-    writeln!(text, "{}", plain(line.trim_end())).ok();
 }

@@ -11,6 +11,7 @@ pub mod man;
 pub mod plot;
 pub mod replay;
 pub mod retarget;
+pub mod runs;
 pub mod tracks;
 pub mod train;
 
@@ -28,6 +29,7 @@ pub enum Verb {
     Retarget(retarget::Args),
     Tracks(tracks::Args),
     Train(train::Args),
+    Runs(runs::Args),
     Eval(eval::Args),
     Replay(replay::Args),
     Plot(plot::Args),
@@ -46,12 +48,13 @@ pub fn run(verb: Verb, command: Command, library: &Path, printer: &Printer) -> O
         Verb::Retarget(args) => args.run(library, printer),
         Verb::Tracks(args) => args.run(library, printer),
         Verb::Train(args) => args.run(library, printer),
+        Verb::Runs(args) => args.run(printer),
         Verb::Eval(args) => args.run(printer),
         Verb::Plot(args) => args.run(printer),
         Verb::Bench(args) => args.run(printer),
         Verb::Replay(args) => args.run(library, printer),
         Verb::Doctor(args) => args.run(library, printer),
-        Verb::Completions(args) => args.run(command, printer),
+        Verb::Completions(args) => args.run(printer),
         Verb::Man(args) => args.run(command, printer),
     }
 }

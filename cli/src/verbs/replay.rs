@@ -207,7 +207,8 @@ impl Args {
             return Ok(Source::Run(run));
         }
         let what = self.what.as_deref();
-        let file = locate::file_or_newest(what, library, &locate::ANIMATIONS, "motion")?;
+        let file = locate::file_or_newest(what, library, &locate::ANIMATIONS, "motion")
+            .map_err(|failure| locate::or_run(what, failure))?;
         Ok(Source::Animation(file))
     }
 

@@ -59,6 +59,7 @@ impl Args {
             motion,
             skeleton,
             seconds,
+            ..
         } = preparation.run(printer)?;
         let quality = motion.quality(&skeleton);
         let seconds = seconds.unwrap_or_default();

@@ -1,5 +1,6 @@
 //! `mimic train`: trains a policy to perform a motion under physics.
 
+mod clock;
 mod finish;
 mod preset;
 mod progress;
@@ -14,7 +15,9 @@ use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use mimic::run::{Claim, Run, RunError, Session, files};
+use clock::Clock;
+use finish::Stopped;
+use mimic::run::{Claim, Plan, Run, RunError, Session, files};
 use mimic::task::{TASKS, TaskError};
 use preset::Preset;
 use progress::Progress;
@@ -78,7 +81,7 @@ pub struct Args {
     /// Number of samples to learn from, e.g. 5M or 800k [default: that of the preset]
     #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
     samples: Option<u64>,
-    /// Stop after this many minutes, even if samples are left
+    /// Stop after this many minutes, even if samples are left; preparing and measuring count as well
     #[arg(long, value_name = "MIN", value_parser = minutes, allow_negative_numbers = true)]
     minutes: Option<f64>,
     /// Random seed; the same seed gives the same result, bit for bit [default: that of the preset]
@@ -103,58 +106,36 @@ pub struct Args {
     retarget: RetargetArgs,
 }
 
+/// The paths of all settings, for `--set`.
+pub fn settings() -> Vec<String> {
+    setting::known(&Plan::default())
+}
+
 /// The names of the tasks and what they are.
 fn tasks() -> PossibleValuesParser {
     let value = |(name, about): (&'static str, &'static str)| PossibleValue::new(name).help(about);
     PossibleValuesParser::new(TASKS.map(value))
 }
 
-/// Why a training session ended.
-enum End {
-    Done,
-    OutOfTime,
-    Interrupted,
-}
-
 impl Args {
     /// Runs the command.
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
+        let begun = Instant::now();
         let threads = runs::use_threads(self.threads)?;
         let run = match &self.resume {
             Some(run) => runs::open(Some(run))?,
             None => self.create(library, printer)?,
         };
         let folder = run.dir().to_owned();
-        let outcome = self.learn(run, threads, printer);
+        let minutes = self
+            .minutes
+            .map(|minutes| Duration::from_secs_f64(60.0 * minutes));
+        let outcome = learn(run, Clock::new(begun, minutes), threads, printer);
         if outcome.is_err() && self.resume.is_none() {
             // Unless something was saved, there is nothing that a later command could use.
             Run::discard(folder);
         }
         outcome
-    }
-
-    /// Trains the run, or makes up for what is missing of its results.
-    fn learn(&self, run: Run, threads: usize, printer: &Printer) -> Outcome {
-        let config = run.dir().join(files::CONFIG);
-        let session = Session::open(run);
-        let mut session = session.map_err(|e| preset::failure(Some(&config), e))?;
-        if session.is_done() {
-            return finish::make_up(&session, printer);
-        }
-        printer.note(format!(
-            "training `{}` on {threads} threads; Ctrl-C saves and stops",
-            session.run().dir().display()
-        ));
-        let minutes = self
-            .minutes
-            .map(|minutes| Duration::from_secs_f64(60.0 * minutes));
-        match train(&mut session, minutes, printer)? {
-            End::Interrupted => {
-                printer.say(farewell(session.run()));
-                Ok(())
-            }
-            End::OutOfTime | End::Done => finish::finish(&session, printer),
-        }
     }
 
     /// Makes the run. Its folder is claimed first, so that another process doesn't take it meanwhile, and is removed again if
@@ -165,12 +146,13 @@ impl Args {
         let claim = self.claim(&preparations, printer)?;
         let mut motions = Vec::new();
         let mut skeleton = None;
-        for preparation in &preparations {
+        let prepared = Preparation::run_all(&preparations, printer)?;
+        for (preparation, prepared) in preparations.iter().zip(prepared) {
             let Prepared {
                 motion,
                 skeleton: own,
                 ..
-            } = preparation.run(printer)?;
+            } = prepared;
             let skeleton = skeleton.get_or_insert(own);
             motion
                 .check_skeleton(skeleton)
@@ -265,10 +247,31 @@ impl Args {
     }
 }
 
+/// Trains the run, or makes up for what is missing of its results.
+fn learn(run: Run, clock: Clock, threads: usize, printer: &Printer) -> Outcome {
+    let config = run.dir().join(files::CONFIG);
+    let session = Session::open(run);
+    let mut session = session.map_err(|e| preset::failure(Some(&config), e))?;
+    if session.is_done() {
+        return finish::make_up(&session, printer);
+    }
+    printer.note(format!(
+        "training `{}` on {threads} threads; Ctrl-C saves and stops",
+        session.run().dir().display()
+    ));
+    match train(&mut session, clock, printer)? {
+        Stopped::Interrupt => {
+            printer.say(farewell(session.run()));
+            finish::interrupted(session.run(), printer)
+        }
+        stopped => finish::finish(&session, stopped, printer),
+    }
+}
+
 /// Trains until the samples or the time are used up, until it is asked to stop, or until nobody reads its lines any more. It
-/// saves between rounds only: there a run can be continued bit for bit.
-fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Outcome<End> {
-    let begun = Instant::now();
+/// saves between rounds only: there a run can be continued bit for bit. Time that is up within a round leaves the policy, and
+/// the run goes on before that round.
+fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<Stopped> {
     let progress = Progress::new(session, printer);
     let stop = Stop::on_signals({
         let (bar, printer, text) = (progress.bar(), *printer, farewell(session.run()));
@@ -283,28 +286,36 @@ fn train(session: &mut Session, time: Option<Duration>, printer: &Printer) -> Ou
         let iteration = iteration.map_err(|e| unwritten(session.run(), e))?;
         if unheard.is_none() {
             // What is learned in this round is saved first, whatever became of standard output.
-            unheard = progress.show(&iteration, printer).err();
+            unheard = progress.show(&iteration, &clock, printer).err();
         }
         let ends = stop.is_wanted() || unheard.is_some();
         if ends {
             progress.say("finishing this round");
         }
+        let ending = finish::longest(session, iteration.samples_per_second);
+        let is_over = clock.end_iteration(ending);
         if !session.can_be_saved() {
+            if is_over {
+                session
+                    .save_policy()
+                    .map_err(|e| unwritten(session.run(), e))?;
+                break Stopped::Minutes;
+            }
             continue;
         }
         session.save().map_err(|e| unwritten(session.run(), e))?;
         if ends {
-            break End::Interrupted;
+            break Stopped::Interrupt;
         }
         if session.is_done() {
-            break End::Done;
+            break Stopped::Samples;
         }
-        if time.is_some_and(|time| begun.elapsed() >= time) {
-            break End::OutOfTime;
+        if clock.end_round(ending) {
+            break Stopped::Minutes;
         }
     };
     let end = if stop.release() {
-        End::Interrupted
+        Stopped::Interrupt
     } else {
         end
     };

@@ -14,6 +14,7 @@ fn help_and_version_succeed() {
         "retarget",
         "tracks",
         "train",
+        "runs",
         "eval",
         "replay",
         "bench",
@@ -202,6 +203,108 @@ fn what_is_there_is_not_called_missing() {
     let long = format!("{}.fbx", "x".repeat(300));
     let said = bench.complaint(&["info", &long], 2);
     assert!(said.contains("cannot be read"), "{said}");
+}
+
+/// Whatever is wrong and whichever verb says so, standard output has one object, and its exit code is the program's.
+#[test]
+fn every_verb_fails_in_json() {
+    let bench = Workbench::with_run();
+    bench.write("empty.fbx", b"");
+    bench.write("notes.txt", b"kick it harder");
+    let verbs = [
+        "info",
+        "import",
+        "edit",
+        "retarget",
+        "tracks",
+        "train",
+        "runs",
+        "eval",
+        "replay",
+        "plot",
+        "bench",
+        "doctor",
+        "completions",
+        "man",
+    ];
+    let mut lines: Vec<Vec<&str>> = verbs.map(|verb| vec![verb, "--nothing"]).into();
+    // Those that take a file or a run, without it and with wrong ones.
+    for wrong in [
+        "absent",
+        "empty.fbx",
+        "notes.txt",
+        "far/away.clip",
+        "",
+        "--",
+    ] {
+        let takes = verbs
+            .iter()
+            .filter(|v| !["bench", "doctor", "completions", "man"].contains(v));
+        lines.extend(takes.map(|verb| match *verb {
+            "replay" => vec!["replay", "--save", "a.rrd", wrong],
+            verb => vec![verb, wrong],
+        }));
+    }
+    lines.extend([
+        vec![],
+        vec!["--quiet"],
+        vec!["trian", "sway.txt"],
+        vec!["info", "sway.txt", "--quiet", "--verbose"],
+        vec!["import", "sway.txt", "--fps", "fast"],
+        vec!["import", "sway.txt", "--out", "sway.txt/a.clip"],
+        vec!["edit", "sway.txt", "--warp", "1"],
+        vec!["edit", "sway.txt", "--speed", "-1"],
+        vec!["retarget", "sway.txt", "--skeleton", "absent.xml"],
+        vec!["train", "sway.txt", "--samples", "many"],
+        vec!["train", "sway.txt", "--set", "nothing=1"],
+        vec!["train", "sway.txt", "--resume", "sway"],
+        vec!["train", "--resume", "sway"],
+        vec!["eval", "sway", "--episodes", "0"],
+        vec!["eval", "sway", "--out", "runs/sway/config.json"],
+        vec!["replay", "sway"],
+        vec!["plot", "sway", "--smooth", "0"],
+        vec!["bench", "--seconds", "0"],
+        vec!["completions", "tcsh"],
+        vec!["man", "--out", "sway.txt"],
+    ]);
+    let mut failed = 0;
+    for line in lines {
+        let output = bench
+            .mimic(&["--json"])
+            .args(&line)
+            .output()
+            .expect("it runs");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let code = output.status.code().unwrap_or(-1);
+        if code == 0 {
+            // `runs ""` lists nothing, and what follows `--` may be left out.
+            continue;
+        }
+        failed += 1;
+        assert!(code == 1 || code == 2, "{line:?} ends with {code}");
+        assert_eq!(text.lines().count(), 1, "{line:?}: {text}");
+        let printed: serde_json::Value = serde_json::from_str(&text).expect("an object");
+        let error = &printed["error"];
+        assert_eq!(error["exit"], code, "{line:?}");
+        for part in ["message", "remedy"] {
+            let part = error[part].as_str().unwrap_or_default();
+            assert!(
+                !part.is_empty() && !part.contains(['\n', '\x1b']),
+                "{line:?}: {error}"
+            );
+        }
+        for part in ["file", "place"] {
+            assert!(
+                error[part].is_null() || error[part].is_string(),
+                "{line:?}: {error}"
+            );
+        }
+        assert!(
+            !output.stderr.is_empty(),
+            "{line:?} says so on standard error"
+        );
+    }
+    assert!(failed > 60, "{failed} lines failed");
 }
 
 #[test]

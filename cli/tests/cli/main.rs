@@ -1,19 +1,24 @@
 //! The `mimic` program as its users meet it.
 
+mod completions;
 mod disturbed;
 mod edit;
 mod exit_codes;
 mod import;
+mod info;
 #[cfg(not(feature = "rerun"))]
 mod lean;
+mod meant;
 mod output;
 #[cfg(feature = "rerun")]
 mod readme;
 #[cfg(feature = "rerun")]
 mod replay;
+mod runs;
 mod shown;
 mod spared;
 mod stages;
 mod talk;
 mod training;
+mod verdict;
 mod workbench;

@@ -42,6 +42,37 @@ fn what_retargeting_finds_is_said_once() {
 }
 
 #[test]
+fn what_is_found_in_several_files_is_said_once_with_a_count() {
+    let bench = with_gap();
+    let gap = std::fs::read(bench.path("gap.txt")).expect("it was written");
+    bench.write("gap2.txt", &gap);
+    bench.write("gap3.txt", &gap);
+    let tiny = br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 32, "hidden": [8] }"#;
+    bench.write("tiny.json", tiny);
+    let said = talk(
+        &bench,
+        &[
+            "train",
+            "gap.txt",
+            "gap2.txt",
+            "gap3.txt",
+            "--preset",
+            "tiny.json",
+        ],
+    );
+    let gaps: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("[loop-gap]"))
+        .collect();
+    assert_eq!(gaps.len(), 1, "{said}");
+    assert!(gaps[0].contains("`gap.txt`: "), "{said}");
+    assert!(
+        gaps[0].ends_with("[loop-gap], and 2 more like it"),
+        "{said}"
+    );
+}
+
+#[test]
 fn quiet_says_results_and_errors_alone() {
     let bench = with_gap();
     let output = bench
@@ -93,7 +124,7 @@ fn colours_are_for_terminals_without_no_color() {
 fn completions_and_manual_are_json_too() {
     let bench = Workbench::new();
     for (line, word) in [
-        (&["completions", "bash"][..], "retarget"),
+        (&["completions", "bash"][..], "complete "),
         (&["man"], ".TH"),
     ] {
         let text = bench.json(line)["text"].as_str().map(str::to_owned);

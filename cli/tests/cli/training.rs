@@ -53,7 +53,9 @@ fn a_run_is_trained_measured_and_recorded() {
     let bench = with_preset();
     let line = ["train", "sway.txt", "--preset", "small.json", "--json"];
     let output = bench.mimic(&line).assert().success();
-    let printed = lines(&output.get_output().stdout);
+    let mut printed = lines(&output.get_output().stdout);
+    let end = printed.pop().expect("a last line");
+    assert_eq!(end["stopped"], "samples");
     assert_eq!(printed.len(), 4, "512 samples in iterations of 128");
     let logged = std::fs::read(bench.path("runs/sway/metrics.jsonl")).unwrap_or_default();
     let mut named = lines(&logged);

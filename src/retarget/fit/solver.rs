@@ -80,10 +80,13 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Improves `frames` until hardly anything is gained any more; returns the most steps that a window took.
-    pub fn run(&self, frames: &mut [Vec<f64>]) -> usize {
+    /// Improves `frames` until hardly anything is gained any more; returns the most steps that a window took. `progress` is
+    /// told which share of the windows is done.
+    pub fn run(&self, frames: &mut [Vec<f64>], progress: impl Fn(f64)) -> usize {
         let mut most = 0;
-        for window in self.windows(frames.len()) {
+        let windows: Vec<Window> = self.windows(frames.len()).collect();
+        for (done, window) in windows.iter().copied().enumerate() {
+            progress(done as f64 / windows.len() as f64);
             // The whole window until it gains little, and then its parts until each is still.
             let rough = self.search(frames, window, |gain, _| gain < GAIN);
             most = most.max(rough.steps);

@@ -19,6 +19,7 @@ mod terminate;
 #[cfg(test)]
 mod tests;
 mod transition;
+mod verdict;
 
 pub use observe::{ObservationInputs, layout, observation_size, observe};
 pub use placement::Placement;
@@ -31,6 +32,7 @@ use super::episode::{Episode, Measure};
 use super::error::TaskError;
 use super::starts::{Span, StartDistribution};
 use super::step::{Block, Case, Purpose};
+use super::verdict::{Performance, Verdict};
 use crate::clip::LoopMode;
 use crate::motion::Motion;
 use crate::task::model::CharacterModel;
@@ -176,5 +178,9 @@ impl Task for Imitate {
         let largest_momentum = episodes.iter().map(largest).fold(0.0, f32::max);
         let links = &self.references[0].contact_links;
         measures::measures(&self.model, links, largest_momentum, episodes)
+    }
+
+    fn verdict(&self, found: &Performance) -> Verdict {
+        verdict::verdict(found)
     }
 }

@@ -1,6 +1,7 @@
 //! The end of training: evaluation, recording, and how to watch the result.
 
 use super::resume::{program, unwritten};
+use crate::amount;
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::recording;
@@ -8,32 +9,109 @@ use crate::runs;
 use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
-use mimic::run::{Run, Session, files};
+use mimic::run::{CaseEvaluation, Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
+use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Length of the recording of a looping motion, seconds.
 const REPLAY_S: f64 = 10.0;
 
+/// Why a training session ended.
+#[derive(Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stopped {
+    /// The samples are used up.
+    Samples,
+    /// There is no time for another round.
+    Minutes,
+    /// By a signal.
+    Interrupt,
+}
+
 /// Evaluates and records what was learned.
-pub fn finish(session: &Session, printer: &Printer) -> Outcome {
+pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome {
     let run = session.run();
-    let options = Options {
-        perturbations: runs::perturbations(run, false),
-        ..Options::default()
-    };
+    let options = options(run);
     let results = runs::evaluate(run, &options, printer)?;
     run.keep_evaluation(&results)?;
     let recorded = record(run, printer)?;
     if printer.is_json() {
-        return Ok(());
+        return last_line(run, stopped, CaseEvaluation::json(&results), printer);
     }
     let folder = run.dir().display();
     let look = match recorded {
         Some(file) => how_to_look(run.dir(), &file),
         None => String::new(),
     };
-    printer.text(&format!("{folder}\n{}{look}", eval::text(&results)))
+    let advice = advice(session, stopped, &results);
+    let table = eval::text(&results, advice.as_deref());
+    printer.text(&format!("{folder}\n{table}{look}"))
+}
+
+/// Ends a session that was interrupted, and that nothing more is to be said of.
+pub fn interrupted(run: &Run, printer: &Printer) -> Outcome {
+    match printer.is_json() {
+        true => last_line(run, Stopped::Interrupt, Value::Null, printer),
+        false => Ok(()),
+    }
+}
+
+/// The last line of `--json`: which run it was, why it ended, and how good it is, if that was measured.
+fn last_line(run: &Run, stopped: Stopped, eval: Value, printer: &Printer) -> Outcome {
+    printer.json_line(&json!({ "run": run.dir(), "stopped": stopped, "eval": eval }))
+}
+
+/// How a run is evaluated at its end.
+fn options(run: &Run) -> Options {
+    Options {
+        perturbations: runs::perturbations(run, false),
+        ..Options::default()
+    }
+}
+
+/// How long [`finish`] takes at most, for a session that learns `samples_per_second`. An evaluation takes the steps of all its
+/// episodes; learning takes the same steps and an update, so the evaluation is faster.
+pub fn longest(session: &Session, samples_per_second: f64) -> Duration {
+    let options = options(session.run());
+    let again = if options.perturbations.is_some() {
+        2
+    } else {
+        1
+    };
+    // One episode more starts from rest.
+    let episodes = (again * options.episodes + 1) as f64;
+    let task = session.trainer().task();
+    let lengths = task.cases().iter();
+    let seconds: f64 = lengths
+        .map(|case| case.duration_s.unwrap_or(options.seconds))
+        .sum();
+    let steps = episodes * seconds * task.control_hz();
+    Duration::try_from_secs_f64(steps / samples_per_second).unwrap_or(Duration::MAX)
+}
+
+/// What to do about a run that isn't learned, or not to its end.
+fn advice(session: &Session, stopped: Stopped, results: &[CaseEvaluation]) -> Option<String> {
+    let (mimic, folder) = (program(), session.run().dir().display());
+    let (samples, planned) = (
+        session.trainer().samples(),
+        session.trainer().settings().samples,
+    );
+    let learned = results.iter().all(|one| one.evaluation.verdict.learned);
+    match stopped {
+        Stopped::Samples if learned => None,
+        Stopped::Samples => Some(format!(
+            "train with more samples, by the same command with `--samples {}`",
+            amount::count(planned.saturating_mul(2))
+        )),
+        Stopped::Minutes | Stopped::Interrupt => Some(format!(
+            "stopped by `--minutes` after {} of {} samples, go on with `{mimic} train --resume {folder}`",
+            amount::count(samples),
+            amount::count(planned),
+        )),
+    }
 }
 
 /// For a run that has used up its samples: does what a session that was killed left out, and makes a policy that was lost or
@@ -57,7 +135,7 @@ pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
     ));
     // The policy follows from the checkpoint.
     session.save().map_err(|e| unwritten(run, e))?;
-    finish(session, printer)
+    finish(session, Stopped::Samples, printer)
 }
 
 /// Writes the recording and returns its file; `None` if the agent fails at once, or this build cannot write recordings.

@@ -99,11 +99,16 @@ fn file(wanted: &Path) -> Outcome<PathBuf> {
         return Ok(wanted.to_path_buf());
     }
     let run = locate::existing_run(wanted).ok_or_else(|| {
+        let near = locate::meant_preset(wanted, PRESETS.map(|preset| preset.name));
         let names = PRESETS.map(|preset| format!("`{}`", preset.name));
-        Failure::user(format!("there is no preset `{}`", wanted.display())).with_remedy(format!(
-            "choose {}, a JSON file with a plan, or a run",
-            names.join(", ")
-        ))
+        let choice = || {
+            format!(
+                "choose {}, a JSON file with a plan, or a run",
+                names.join(", ")
+            )
+        };
+        Failure::user(format!("there is no preset `{}`", wanted.display()))
+            .with_remedy(near.unwrap_or_else(choice))
     })?;
     Ok(run.join(files::CONFIG))
 }

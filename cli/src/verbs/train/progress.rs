@@ -1,51 +1,76 @@
 //! How far a training session is.
 
+use super::clock::Clock;
+use crate::amount;
 use crate::failure::Outcome;
 use crate::printer::Printer;
+use crate::progress::Pace;
 use indicatif::ProgressBar;
 use mimic::run::{Iteration, Session};
 use serde_json::json;
+use std::cell::RefCell;
+use std::time::Instant;
 
 /// A progress bar, or lines where nobody sees a bar.
 pub struct Progress {
     bar: ProgressBar,
+    pace: RefCell<Pace>,
     folder: String,
+    begun: Instant,
+    /// Samples at the start, and those of the plan.
+    first: u64,
+    planned: u64,
 }
 
 impl Progress {
     /// Starts where the session does.
     pub fn new(session: &Session, printer: &Printer) -> Self {
-        let bar = printer.progress(
+        let (first, planned) = (
+            session.trainer().samples(),
             session.trainer().settings().samples,
-            "{bar:16} {percent:>3} %  {msg}  {eta} left",
         );
-        bar.set_position(session.trainer().samples());
-        bar.reset_eta();
+        // Bar, message and time left fill 80 columns at most.
+        let bar = printer.progress(planned, "{bar:8} {percent:>3} %  {msg}");
+        bar.set_position(first);
         Self {
             bar,
+            pace: RefCell::new(Pace::new()),
             folder: session.run().dir().display().to_string(),
+            begun: Instant::now(),
+            first,
+            planned,
         }
     }
 
     /// Shows an iteration. The line that is printed names the run; the log does not, because a run can be moved.
-    pub fn show(&self, iteration: &Iteration, printer: &Printer) -> Outcome {
-        let metrics = &iteration.metrics;
-        let message = format!(
-            "{:.1}k samples/s  normalised return {}  episode {} s",
-            iteration.samples_per_second / 1e3,
-            number(metrics.normalized_return, 3),
-            number(metrics.episode_length, 1),
-        );
-        self.bar.set_position(metrics.samples);
+    pub fn show(&self, iteration: &Iteration, clock: &Clock, printer: &Printer) -> Outcome {
+        let samples = iteration.metrics.samples;
+        let left = self.left(samples, clock);
+        let message = message(iteration, left);
+        self.bar.set_position(samples);
         if printer.is_json() {
             let mut line = json!(iteration);
             line["run"] = json!(self.folder);
             printer.json_line(&line)?;
         } else if self.bar.is_hidden() {
-            printer.detail(format!("{} samples  {message}", metrics.samples));
+            let percent = 100.0 * samples as f64 / self.planned.max(1) as f64;
+            let line = format!("{:>3.0} %  {message}", percent.min(100.0).floor());
+            match self.pace.borrow_mut().is_due() {
+                true => printer.say(line),
+                false => printer.detail(line),
+            }
         }
         self.bar.set_message(message);
         Ok(())
+    }
+
+    /// Seconds to the end: of the samples or of the time, whichever comes first.
+    fn left(&self, samples: u64, clock: &Clock) -> f64 {
+        let learned = samples.saturating_sub(self.first).max(1) as f64;
+        let rest = self.planned.saturating_sub(samples) as f64;
+        let rest = self.begun.elapsed().as_secs_f64() * rest / learned;
+        let limit = clock.left();
+        limit.map_or(rest, |limit| limit.as_secs_f64().min(rest))
     }
 
     /// Says what is going on.
@@ -65,7 +90,46 @@ impl Drop for Progress {
     }
 }
 
+/// What an iteration did: how fast it learned, which share of the largest possible reward an episode got, and how long an
+/// episode lasted before it failed or ended.
+fn message(iteration: &Iteration, left: f64) -> String {
+    let metrics = &iteration.metrics;
+    format!(
+        "{:.0}k samples/s  reward {} of 1  episodes {} s  {} left",
+        iteration.samples_per_second / 1e3,
+        number(metrics.normalized_return, 2),
+        number(metrics.episode_length, 1),
+        amount::duration(left),
+    )
+}
+
 /// A figure of the episodes that ended; a dash if none did.
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mimic::learn::Metrics;
+
+    #[test]
+    fn a_line_fits_eighty_columns() {
+        let iteration = Iteration {
+            metrics: Metrics {
+                normalized_return: Some(0.812),
+                episode_length: Some(25.04),
+                ..Metrics::default()
+            },
+            seconds: 1.0,
+            samples_per_second: 123_456.0,
+        };
+        let line = message(&iteration, 5000.0);
+        assert_eq!(
+            line,
+            "123k samples/s  reward 0.81 of 1  episodes 25.0 s  83 min left"
+        );
+        let bar = "━━━━━━━━ 100 %  ";
+        assert!(bar.chars().count() + line.chars().count() < 80);
+    }
 }

@@ -1,9 +1,9 @@
 //! Single settings of a plan, by their path: `ppo.gamma=0.99`.
 
 use crate::failure::{Failure, Outcome};
+use mimic::explain::nearest;
 use mimic::run::Plan;
 use serde_json::Value;
-use strsim::levenshtein;
 
 /// How many similar names an error lists.
 const SHOWN: usize = 3;
@@ -42,15 +42,22 @@ pub fn change(plan: &Plan, change: &str) -> Outcome<Plan> {
     })
 }
 
+/// The paths of all settings of a plan, without groups of settings.
+pub fn known(plan: &Plan) -> Vec<String> {
+    let values = serde_json::to_value(plan).unwrap_or_default();
+    let single = |path: &String| {
+        let pointer = format!("/{}", path.replace('.', "/"));
+        values
+            .pointer(&pointer)
+            .is_some_and(|value| !value.is_object())
+    };
+    paths(&values).into_iter().filter(single).collect()
+}
+
 /// The names most similar to `path`, in a sentence.
 fn similar(path: &str, known: &[String]) -> String {
-    let mut near: Vec<&String> = known.iter().collect();
-    near.sort_by_key(|name| distance(path, name));
-    let near: Vec<String> = near
-        .iter()
-        .take(SHOWN)
-        .map(|name| format!("`{name}`"))
-        .collect();
+    let near = nearest(path, known, SHOWN);
+    let near: Vec<String> = near.iter().map(|name| format!("`{name}`")).collect();
     near.join(", ")
 }
 
@@ -65,12 +72,6 @@ fn paths(value: &Value) -> Vec<String> {
         found.extend(paths(value).iter().map(|inner| format!("{name}.{inner}")));
     }
     found
-}
-
-/// Edits from what was typed to a path that exists. The last names alone count as well, for whoever leaves out the group.
-fn distance(typed: &str, name: &str) -> usize {
-    let last = |path: &str| path.rsplit(['.', '/']).next().unwrap_or(path).to_owned();
-    levenshtein(typed, name).min(levenshtein(&last(typed), &last(name)))
 }
 
 #[cfg(test)]

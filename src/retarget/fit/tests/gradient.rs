@@ -151,6 +151,7 @@ fn distance_of_hand(weight: f64) -> f64 {
         cycle: None,
         fps: clip.fps,
         to_perform: false,
+        progress: &|_| (),
     };
     let fitted = fit.run(goals.clone());
     let apart = fitted.frames.iter().zip(&goals.points).map(|(qpos, goal)| {

@@ -74,7 +74,7 @@ fn windows_give_what_one_solution_over_all_frames_gives() {
         let solved = |longest: usize| {
             let mut frames = goals.guess.clone();
             let solver = Solver::new(&problem, cycle).with_windows_of(longest);
-            solver.run(&mut frames);
+            solver.run(&mut frames, |_| ());
             frames
         };
         let mut apart = vec![0.0; skeleton.nv];

@@ -4,6 +4,7 @@ mod measures;
 mod perturb;
 mod reward;
 mod transitions;
+mod verdict;
 
 use super::environment::Imitation;
 use super::observe::{ObservationInputs, layout, observation_size, observe};

@@ -1,0 +1,52 @@
+//! What is said of made-up evaluations.
+
+use crate::task::imitate::verdict::verdict;
+use crate::task::{Good, Measure, Performance, Unit, Verdict};
+
+/// The verdict on 32 episodes with these measures, some of which failed.
+fn of(survival: f64, error_mm: f64, failed: &[f64]) -> Verdict {
+    let measures = [
+        Measure::new("survival", "survival", survival)
+            .good(Good::High, Unit::Share)
+            .enough(0.95),
+        Measure::new("mpjpe_local_mm", "body error", error_mm)
+            .good(Good::Low, Unit::Millimeters)
+            .enough(50.0),
+    ];
+    verdict(&Performance {
+        episodes: 32,
+        measures: &measures,
+        failed,
+    })
+}
+
+#[test]
+fn a_verdict_says_what_is_wrong() {
+    let all = of(1.0, 20.0, &[]);
+    assert!(all.learned && all.text == "learned: it lasts from all 32 start phases");
+    let one = of(0.97, 20.0, &[0.4375]);
+    assert!(one.learned && one.text == "learned, but it fails from phase 0.44");
+    let some = of(0.96, 20.0, &[0.0, 0.03125, 0.5, 0.53125]);
+    assert!(
+        some.learned
+            && some.text == "learned, but it fails from phases 0.00, 0.03, 0.50 and 1 more"
+    );
+    let loose = of(1.0, 83.4, &[]);
+    assert!(
+        !loose.learned && loose.text == "not yet learned: it lasts, but its bodies are 83 mm off"
+    );
+    let short = of(0.152, 20.0, &[0.0]);
+    assert!(!short.learned && short.text == "not yet learned: it lasts 15 % of the time");
+}
+
+#[test]
+fn what_is_no_number_is_not_enough() {
+    assert!(!of(f64::NAN, 20.0, &[]).learned);
+    assert!(!of(1.0, f64::NAN, &[]).learned);
+    let nothing = Performance {
+        episodes: 32,
+        measures: &[],
+        failed: &[],
+    };
+    assert!(!verdict(&nothing).learned);
+}
