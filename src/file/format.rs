@@ -32,7 +32,7 @@ impl Stamp {
 impl Format {
     /// Checks that a JSON object says that it has this format. Older versions can be read, newer ones can't. A newer
     /// version may have changed anything else, so nothing else may be looked at before.
-    pub(super) fn check(&self, object: &str) -> Result<(), Flaw> {
+    pub(crate) fn check(&self, object: &str) -> Result<(), Flaw> {
         let Stamp { format, version } = Stamp::of(object).ok_or(Flaw::Foreign)?;
         if format != self.name {
             return Err(Flaw::OtherFormat { found: format });

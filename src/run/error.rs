@@ -146,7 +146,7 @@ impl Explain for RunError {
                     .file(path)
                     .remedy("check the path, its permissions and the free space on the disk")
             }
-            Self::Exists(path) => Explanation::input("already holds a run")
+            Self::Exists(path) => Explanation::input("this folder already holds a run")
                 .file(path)
                 .remedy_by(
                     Parameter::Output,
@@ -165,12 +165,14 @@ impl Explain for RunError {
                     .file(path)
                     .remedy("wait until it ends, or stop it")
             }
-            Self::NoRun(path) => Explanation::input("is not a run: it has no config.json")
+            Self::NoRun(path) => {
+                Explanation::input("this is not a run: there is no config.json in it")
+                    .file(path)
+                    .remedy("give the folder of a run")
+            }
+            Self::NoPolicy(path) => Explanation::input("this run has no policy")
                 .file(path)
-                .remedy("give the folder of a run"),
-            Self::NoPolicy(path) => Explanation::input("has no policy yet")
-                .file(path)
-                .remedy("train it first"),
+                .remedy("resume its training, which makes the policy"),
             Self::Config { path, reason } => Explanation::input(reason)
                 .file(path)
                 .remedy("correct the file, or train a new run"),

@@ -5,13 +5,15 @@ use super::controller::Controller;
 use super::error::RunError;
 use super::files;
 use super::plan::Plan;
-use crate::file::{Lock, text_at_most};
+use crate::file::{Flaw, Format, Lock, text_at_most};
 use crate::learn::{Metrics, Policy, PolicySpec, Trainer, TrainerState};
 use crate::motion::Motion;
 use crate::skeleton::Skeleton;
 use crate::task::{Block, CharacterModel, Task, TaskSettings, size};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -22,11 +24,17 @@ use std::sync::Arc;
 #[serde(deny_unknown_fields)]
 pub(super) struct RunConfig {
     format: String,
-    version: u32,
+    version: u64,
     skeleton: String,
     motions: Vec<String>,
     plan: Plan,
 }
+
+const FORMAT: Format = Format {
+    name: "run",
+    version: 1,
+    remedy: "train a new run",
+};
 
 /// What a policy file says beside its network: all that it takes to act.
 #[derive(Serialize, Deserialize)]
@@ -44,8 +52,8 @@ struct PolicyDetails {
 impl RunConfig {
     pub(super) fn new(skeleton: &str, motions: usize, plan: Plan) -> Self {
         Self {
-            format: "run".to_owned(),
-            version: 1,
+            format: FORMAT.name.to_owned(),
+            version: FORMAT.version,
             skeleton: skeleton.to_owned(),
             motions: (0..motions).map(files::reference).collect(),
             plan,
@@ -338,25 +346,23 @@ fn config(path: &Path) -> Result<RunConfig, RunError> {
         reason,
     };
     let text = read(path, MOST_BYTES)?;
-    let fields: Value = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
+    let _: IgnoredAny = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
     // A newer version may have other fields, so this comes first.
-    let (format, version) = (&fields["format"], &fields["version"]);
-    if (format, version) != (&json!("run"), &json!(1)) {
-        return Err(wrong(format!(
-            "format {format} {version} is not known to this version"
-        )));
-    }
-    // From the text and not from `fields`, so that an error names the line.
+    FORMAT.check(&text).map_err(|flaw| match flaw {
+        Flaw::Newer { .. } => RunError::File(flaw.of(path, FORMAT)),
+        _ => wrong("this is not the configuration of a run".to_owned()),
+    })?;
     let config: RunConfig = serde_json::from_str(&text).map_err(|e| corrupt(path, e))?;
     config.plan.check().map_err(|e| wrong(e.to_string()))?;
     // A run can be moved, and must not read files outside its folder.
-    for (i, name) in config.motions.iter().enumerate() {
+    let mut seen = BTreeSet::new();
+    for name in &config.motions {
         let file = Path::new(name).file_name();
         if file.is_none_or(|file| file != name.as_str()) {
             return Err(wrong(format!("motion `{name}` is not a plain file name")));
         }
         // A short list could ask for one large file again and again.
-        if config.motions[..i].contains(name) {
+        if !seen.insert(name) {
             return Err(wrong(format!("motion `{name}` is listed twice")));
         }
     }

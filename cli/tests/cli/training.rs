@@ -446,6 +446,15 @@ fn damaged_runs_are_named() {
     bench.write("run/policy.safetensors", &policy[..policy.len() / 2]);
     let said = bench.complaint(&["eval", "run"], 2);
     assert!(said.contains("policy.safetensors"), "{said}");
+    bench.write("run/config.json", b"{}");
+    let said = bench.complaint(&["eval", "run"], 2);
+    assert!(said.contains("not the configuration of a run"), "{said}");
+    bench.write(
+        "run/config.json",
+        br#"{"format": "run", "version": 2, "new": []}"#,
+    );
+    let said = bench.complaint(&["eval", "run"], 2);
+    assert!(said.contains("newer version"), "{said}");
     bench.write("run/config.json", b"{");
     let said = bench.complaint(&["eval", "run"], 2);
     assert!(said.contains("config.json"), "{said}");
