@@ -231,6 +231,8 @@ mod tests {
             message("a\r\nb\u{1b}[2J"),
             "take `a  b [2J`: it is broken; export it again"
         );
+        let file = Explanation::input("it is broken").file("a\u{1b}[2J\n.fbx");
+        assert_eq!(file.to_string(), "`a [2J .fbx`: it is broken");
         let long = message(&"ö".repeat(100_000));
         assert!(long.chars().count() < 1000, "{long}");
         assert!(

@@ -374,3 +374,44 @@ fn reading_costs_no_more_than_the_size_allows() {
     assert!(frugal("one.fbx", &shared_layer(1, 1000)).is_ok());
     assert!(refusal("shared.fbx", &shared_layer(4000, 1000)).contains("implausibly often"));
 }
+
+/// A BVH file of one joint with one channel, whose frames are zeros.
+fn zeros(frames: usize) -> Vec<u8> {
+    let head = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n}\nMOTION\n";
+    let rows = "0\n".repeat(frames);
+    format!("{head}Frames: {frames}\nFrame Time: 0.01\n{rows}").into_bytes()
+}
+
+/// The shortest rows that a text can have ask for the most memory per byte.
+#[test]
+fn a_text_takes_less_memory_than_a_binary_file() {
+    let rows = |row: &str, count: usize| {
+        format!(
+            r#"{{"Loop":"wrap","Frames":[{}]}}"#,
+            vec![row; count].join(",")
+        )
+        .into_bytes()
+    };
+    let row = format!("[1{}]", ",0".repeat(43));
+    let still = String::from_utf8(deepmimic("1")).expect("a text");
+    let start = still.find("[[").expect("it has frames") + 1;
+    let end = still.find(']').expect("a frame ends") + 1;
+    let files = [
+        ("zeros.bvh", zeros(4 << 20)),
+        ("some.bvh", zeros(300_000)),
+        ("empty.txt", rows("[]", 2 << 20)),
+        ("one.txt", rows("[0]", 2 << 20)),
+        ("zero.txt", rows(&row, 80_000)),
+        ("still.txt", rows(&still[start..end], 40_000)),
+    ];
+    for (name, bytes) in files {
+        let start = Instant::now();
+        let (_, peak) = heap::peak_of(|| import::read(&bytes, name, None, &Options::default()));
+        let most = 16 * bytes.len() + FREE;
+        assert!(peak < most, "{name}: {peak} bytes for {}", bytes.len());
+        let soon = SOON + Duration::from_secs(bytes.len() as u64 >> 20);
+        assert!(start.elapsed() < soon, "{name}: {:?}", start.elapsed());
+    }
+    let long = import::read(&zeros(4 << 20), "zeros.bvh", None, &Options::default());
+    assert_too_long(&long.expect_err("refused"));
+}

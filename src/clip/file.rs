@@ -44,18 +44,21 @@ impl Clip {
     /// Writes the clip file `path`, or leaves what was there untouched. Transforms are rounded to `f32`.
     ///
     /// # Errors
-    /// [`Error::File`] when the file can't be written, or the clip has frames of another number of joints.
+    /// [`Error::File`] when the file can't be written, or [`load`](Clip::load) couldn't read it: frames of another number of
+    /// joints, or numbers that aren't finite.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        Ok(self.writer().save(path.as_ref(), FORMAT, &self.header())?)
+        Ok(file::save(path.as_ref(), FORMAT, self.bytes(None))?)
     }
 
     /// The bytes of a clip file. It keeps the text `made`, which [`made_by`](crate::file::made_by) reads.
     ///
     /// # Errors
-    /// [`Error::File`] when the clip has frames of another number of joints.
+    /// [`Error::File`] when [`load`](Clip::load) couldn't read them: frames of another number of joints, or numbers that
+    /// aren't finite.
     pub fn to_bytes(&self, made: Option<&str>) -> Result<Vec<u8>, Error> {
-        let bytes = self.writer().to_bytes(FORMAT, &self.header(), made);
-        Ok(bytes.map_err(|flaw| flaw.of(self.name.as_ref(), FORMAT))?)
+        Ok(self
+            .bytes(made)
+            .map_err(|flaw| flaw.of(self.name.as_ref(), FORMAT))?)
     }
 
     /// Reads the clip file `path`.
@@ -74,6 +77,11 @@ impl Clip {
         for at in rests.chain(frames).chain(self.margin.transforms_mut()) {
             *at = rounded(at);
         }
+    }
+
+    fn bytes(&self, made: Option<&str>) -> Result<Vec<u8>, Flaw> {
+        let writer = self.writer();
+        writer.readable_bytes(FORMAT, &self.header(), made, Clip::from_bytes)
     }
 
     fn header(&self) -> Header {

@@ -17,7 +17,7 @@ pub use format::Format;
 pub use lock::{Holder, LOCK, Lock, LockError};
 pub use made::{holds, made_by};
 pub use read::{read_at_most, text_at_most, unread};
-pub(crate) use tensors::{Reader, Writer, format_of, load};
+pub(crate) use tensors::{Reader, Writer, format_of, load, save};
 pub use unfinished::Unfinished;
 
 use std::fs::File;

@@ -128,6 +128,19 @@ impl Writer {
         })
     }
 
+    /// The same, if `parse` can read them again.
+    pub(crate) fn readable_bytes<T>(
+        &self,
+        format: Format,
+        fields: &impl Serialize,
+        made: Option<&str>,
+        parse: impl FnOnce(&[u8]) -> Result<T, Flaw>,
+    ) -> Result<Vec<u8>, Flaw> {
+        let bytes = self.to_bytes(format, fields, made)?;
+        parse(&bytes)?;
+        Ok(bytes)
+    }
+
     /// Replaces the file `path` at once.
     pub(crate) fn save(
         &self,
@@ -135,10 +148,18 @@ impl Writer {
         format: Format,
         fields: &impl Serialize,
     ) -> Result<(), FileError> {
-        let write = |bytes: Vec<u8>| super::replace(path, &bytes).map_err(Flaw::Write);
-        let written = self.to_bytes(format, fields, None).and_then(write);
-        written.map_err(|flaw| flaw.of(path, format))
+        save(path, format, self.to_bytes(format, fields, None))
     }
+}
+
+/// Replaces the file `path` at once by these bytes.
+pub(crate) fn save(
+    path: &Path,
+    format: Format,
+    bytes: Result<Vec<u8>, Flaw>,
+) -> Result<(), FileError> {
+    let write = |bytes: Vec<u8>| super::replace(path, &bytes).map_err(Flaw::Write);
+    bytes.and_then(write).map_err(|flaw| flaw.of(path, format))
 }
 
 /// Reads the file `path` with `parse`.
@@ -402,6 +423,9 @@ mod tests {
         let error = refused.expect_err("its header is too long");
         assert!(matches!(error.flaw, Flaw::TooLarge { .. }), "{error}");
         assert!(!path.exists());
+        let unread = |_: &[u8]| Err::<(), Flaw>(Flaw::in_tensor("numbers", "not finite"));
+        let refused = writer.readable_bytes(FORMAT, &json!({}), None, unread);
+        assert!(matches!(refused, Err(Flaw::Content { .. })));
         assert!(readable(MOST_BYTES, MOST_BYTES).is_ok());
         assert!(readable(MOST_BYTES + 1, MOST_BYTES).is_err());
     }

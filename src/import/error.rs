@@ -35,7 +35,7 @@ pub enum ErrorKind {
     UnknownTake {
         /// What was asked for.
         wanted: String,
-        /// The takes of the file, with their numbers, at most eight of them.
+        /// The takes of the file to choose from, with their numbers, at most eight of them.
         takes: String,
         /// The take that was probably meant.
         meant: Option<String>,
@@ -134,8 +134,8 @@ impl ErrorKind {
             } => wrong(format!("no take is called `{wanted}`")).remedy_by(
                 Parameter::Take,
                 match meant {
-                    Some(meant) => format!("did you mean `{meant}`? choose one of {takes}"),
-                    None => format!("choose one of {takes}"),
+                    Some(meant) => format!("did you mean `{meant}`? choose {takes}"),
+                    None => format!("choose {takes}"),
                 },
             ),
             Self::EmptyTrim {

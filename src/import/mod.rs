@@ -44,7 +44,7 @@ use crate::file;
 use crate::humanoid;
 use detect::Format;
 use error::malformed;
-use scene::Scene;
+use scene::{Contents, Scene};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -53,9 +53,16 @@ const MOST_BYTES: u64 = 2 << 30;
 
 /// Frames × joints that any file may be sampled to, and how many more per byte of it. A few bytes can claim hours of motion,
 /// but motion that fills hours takes many bytes. Chosen: a minute of 70 joints at 60 Hz from any file, and two bytes per
-/// transform beyond, where formats write 4 (a quaternion of bytes in glTF) to dozens before compression.
+/// transform of a binary file beyond, where formats write 4 (a quaternion of bytes in glTF) to dozens before compression. A
+/// text has at least twelve bytes per transform, as three short numbers take. A transform takes up to 130 bytes while a file
+/// is read, so memory stays below 64 times a binary file and below 16 times a text.
 const FREE_TRANSFORMS: usize = 1 << 18;
 const TRANSFORMS_PER_BYTE: f64 = 0.5;
+const TRANSFORMS_PER_LETTER: f64 = 0.08;
+/// The same in texts that hold binary numbers, as glTF does, or keys in place of frames: these take memory of their own.
+const TRANSFORMS_PER_DENSE_LETTER: f64 = 0.06;
+/// How many bytes tell whether a file is a text: all binary formats have a zero near their beginning.
+const TEXT_HEAD: usize = 64;
 
 /// Tells what is in the file `path`: its takes, joints, axes and unit, without sampling any of its motion.
 ///
@@ -113,9 +120,9 @@ fn clip(
 ) -> Result<Clip, ErrorKind> {
     let scene = open(bytes, file, folder)?;
     let (take, note) = take::choose(scene.as_ref(), options.take.as_deref())?;
-    let read = bytes.len().saturating_add(scene.contents().bytes_beside);
-    let most = FREE_TRANSFORMS + (read as f64 * TRANSFORMS_PER_BYTE) as usize;
+    let most = most_transforms(bytes, scene.contents());
     let mut clip = sample::clip(scene.as_ref(), file, take, options, most)?;
+    drop(scene);
     if options.mirror {
         clip = mirrored(&clip)?;
     }
@@ -127,6 +134,19 @@ fn clip(
     // Last, so that a clip is the same straight from here and from its file.
     clip.round_to_file();
     Ok(clip)
+}
+
+/// Most frames × joints that a file of these bytes and contents may be sampled to.
+fn most_transforms(bytes: &[u8], contents: &Contents) -> usize {
+    let head = &bytes[..bytes.len().min(TEXT_HEAD)];
+    let per_byte = match contents.format {
+        _ if head.contains(&0) => TRANSFORMS_PER_BYTE,
+        "bvh" | "amc" | "deepmimic" => TRANSFORMS_PER_LETTER,
+        _ => TRANSFORMS_PER_DENSE_LETTER,
+    };
+    let beside = contents.bytes_beside as f64 * TRANSFORMS_PER_BYTE;
+    let allowed = bytes.len() as f64 * per_byte + beside;
+    FREE_TRANSFORMS + allowed as usize
 }
 
 /// The clip in the mirror of its figure's sagittal plane.

@@ -58,7 +58,11 @@ pub(super) fn clip(
     let part = Part::new(scene, about, span, fps, most)?;
     let sampled = sampled(&rig, first, part, options)?;
     let wraps = wraps(about, &sampled.own, options);
-    let locals = |world: Vec<Pose>| world.iter().map(|frame| rig.locals(frame)).collect();
+    // Frame by frame, so that no two copies of all frames are in memory.
+    let locals = |world: Vec<Pose>| {
+        let frames = world.into_iter();
+        frames.map(|frame| rig.locals(&frame)).collect()
+    };
     let mut problems = scene.contents().problems.clone();
     problems.extend_from_slice(&about.problems);
     problems.extend((sampled.left_out_first && options.trim.is_none()).then(lead::problem));

@@ -64,20 +64,16 @@ pub(crate) fn wraps(world: &[Vec<Isometry3<f64>>]) -> bool {
 
 /// Whether the jump in velocity at the seam (metres per frame) is no more than the clip itself has.
 fn runs_on(frames: &[Places], jump: &[Vector3<f64>]) -> bool {
-    let steps: Vec<Places> = frames
-        .windows(2)
-        .map(|w| difference(&w[0], &w[1]))
-        .collect();
+    // Steps are made when they are needed: those of all frames would take as much memory as the frames.
+    let step = |pair: &[Places]| difference(&pair[0], &pair[1]);
     // How much velocity changes from frame to frame within the clip is what may happen at the seam, too.
-    let mut jumps: Vec<f64> = steps
-        .windows(2)
-        .map(|w| rms(&difference(&w[0], &w[1])))
-        .collect();
+    let change = |three: &[Places]| rms(&difference(&step(&three[..2]), &step(&three[1..])));
+    let mut jumps: Vec<f64> = frames.windows(3).map(change).collect();
     jumps.sort_by(f64::total_cmp);
     let median = jumps.get(jumps.len() / 2).copied().unwrap_or(0.0);
     let largest = jumps.last().copied().unwrap_or(0.0);
-    let square: f64 = steps.iter().map(|step| rms(step).powi(2)).sum();
-    let speed = (square / steps.len().max(1) as f64).sqrt();
+    let squares = frames.windows(2).map(|pair| rms(&step(pair)).powi(2));
+    let speed = (squares.sum::<f64>() / frames.len().saturating_sub(1).max(1) as f64).sqrt();
     // Any one limit is enough: each covers a kind of motion that the others would refuse.
     let limits = [
         JUMP_OF_MEDIAN * median,

@@ -29,7 +29,10 @@ pub(crate) fn choose(
     }
     let unknown = |wanted: &str| ErrorKind::UnknownTake {
         wanted: wanted.to_owned(),
-        takes: list(scene),
+        takes: match scene.takes() {
+            [only] => format!("`{}`, the only one", only.name),
+            _ => format!("one of {}", list(scene)),
+        },
         meant: meant(wanted, scene.takes().iter().map(|take| &take.name)),
     };
     let (take, note) = match wanted {

@@ -63,9 +63,9 @@ impl Motion {
     /// Writes the motion file `path`; it appears whole or not at all.
     ///
     /// # Errors
-    /// [`MotionError::File`] when the file can't be written.
+    /// [`MotionError::File`] when the file can't be written, or [`load`](Motion::load) couldn't read it.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), MotionError> {
-        Ok(self.writer().save(path.as_ref(), FORMAT, &self.header())?)
+        Ok(file::save(path.as_ref(), FORMAT, self.bytes(None))?)
     }
 
     /// The bytes of a motion file. It keeps the text `made`, which [`made_by`](file::made_by) reads.
@@ -73,8 +73,9 @@ impl Motion {
     /// # Errors
     /// [`MotionError::File`] when the motion's parts don't fit together.
     pub fn to_bytes(&self, made: Option<&str>) -> Result<Vec<u8>, MotionError> {
-        let bytes = self.writer().to_bytes(FORMAT, &self.header(), made);
-        Ok(bytes.map_err(|flaw| flaw.of(self.name.as_ref(), FORMAT))?)
+        Ok(self
+            .bytes(made)
+            .map_err(|flaw| flaw.of(self.name.as_ref(), FORMAT))?)
     }
 
     /// Reads the motion file `path` and checks that all its parts fit together.
@@ -83,6 +84,11 @@ impl Motion {
     /// [`MotionError::File`] when the file can't be read, or is no whole motion of this version or an older one.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, MotionError> {
         Ok(file::load(path.as_ref(), FORMAT, Self::from_bytes)?)
+    }
+
+    fn bytes(&self, made: Option<&str>) -> Result<Vec<u8>, Flaw> {
+        let writer = self.writer();
+        writer.readable_bytes(FORMAT, &self.header(), made, Self::from_bytes)
     }
 
     fn header(&self) -> Header {

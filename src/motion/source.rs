@@ -83,14 +83,22 @@ impl SourceRig {
         writer.push(FIRST_TRANSLATION, &[joints, 3], translations);
         writer.push(FIRST_ROTATION, &[joints, 4], stored::rotations(first));
         if !self.rotations.is_empty() {
-            let at = |f: usize| self.rotations.values().map(move |track| track[f]);
-            let numbers = |q: UnitQuaternion<f64>| [q.w, q.i, q.j, q.k].map(|x| x as f32);
+            let at = |f: usize| {
+                self.rotations
+                    .values()
+                    .filter_map(move |track| track.get(f))
+            };
+            let numbers = |q: &UnitQuaternion<f64>| [q.w, q.i, q.j, q.k].map(|x| x as f32);
             let values = (0..frames).flat_map(at).flat_map(numbers);
             writer.push(ROTATION, &[frames, self.rotations.len(), 4], values);
         }
         if !self.translations.is_empty() {
-            let at = |f: usize| self.translations.values().map(move |track| track[f]);
-            let numbers = |v: Vector3<f64>| [v.x, v.y, v.z].map(|x| x as f32);
+            let at = |f: usize| {
+                self.translations
+                    .values()
+                    .filter_map(move |track| track.get(f))
+            };
+            let numbers = |v: &Vector3<f64>| [v.x, v.y, v.z].map(|x| x as f32);
             let values = (0..frames).flat_map(at).flat_map(numbers);
             writer.push(TRANSLATION, &[frames, self.translations.len(), 3], values);
         }
@@ -104,6 +112,11 @@ impl SourceRig {
         if let Some(joint) = of_map.chain(of_tracks).find(|joint| **joint >= count) {
             let cause = format!("joint {joint} of {count} joints");
             return Err(Flaw::content("source", cause));
+        }
+        for columns in [&header.rotations, &header.translations] {
+            if !columns.is_sorted_by(|a, b| a < b) {
+                return Err(Flaw::content("source", "its tracks are out of order"));
+            }
         }
         let mut joints = stored::tree(reader, PREFIX, header.joints)?;
         stored::name_bones(&mut joints, header.humanoid)?;

@@ -115,10 +115,9 @@ fn standing(contact: &Contact) -> impl Iterator<Item = usize> + '_ {
 /// Mean height above the ground of what the source has standing there, metres.
 fn float(skeleton: &Skeleton, contacts: &[Contact], motion: &Motion) -> f64 {
     let height = |f: usize, bodies: &[usize]| skeleton.lowest_point_of(&motion.bodies[f], bodies);
-    // Depth is measured by itself; here it counts as no height.
-    let heights = contacts
-        .iter()
-        .flat_map(|c| standing(c).map(move |f| height(f, &c.bodies).max(0.0)));
+    // Bodies without shapes touch nothing. Depth is measured by itself; here it counts as no height.
+    let solid = contacts.iter().filter(|contact| !contact.bodies.is_empty());
+    let heights = solid.flat_map(|c| standing(c).map(move |f| height(f, &c.bodies).max(0.0)));
     Spread::of(heights).mean
 }
 

@@ -52,6 +52,13 @@ pub enum SimError {
         /// Name of the body.
         body: String,
     },
+    /// A joint that nothing drives, in a character for a policy.
+    Undriven {
+        /// Name of the body.
+        body: String,
+        /// Name of its joint.
+        joint: String,
+    },
     /// A skeleton without bodies.
     Empty,
 }
@@ -81,6 +88,11 @@ impl Explain for SimError {
                 .remedy("keep one character in the skeleton, with all its bodies under one root"),
             Self::Massless { body } => of_body(body, "it moves but has no mass")
                 .remedy("give the body a geom or an <inertial>"),
+            Self::Undriven { body, joint } => {
+                Explanation::input("nothing drives this joint, so no policy can move it")
+                    .place(format!("joint `{joint}` of body `{body}`"))
+                    .remedy("give it a <position> actuator")
+            }
             Self::Empty => Explanation::input("the skeleton has no bodies")
                 .remedy("add a body with a free joint"),
         }

@@ -3,14 +3,27 @@
 use super::error::{Defect, SkeletonError};
 use super::inertia::{MassProperties, set_total_mass};
 use super::shape::{Solid, isometry};
-use super::{Body, Joint, JointKind, drive};
+use super::{Body, Joint, JointKind, actuators, drive};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Body as MjcfBody, GeomType, Joint as MjcfJoint, JointType};
 use mjcf_rs::compiler::InertiaFromGeom;
 use nalgebra::Vector3;
 
+/// Lengths and distances that are let through, metres. Chosen: no character is a kilometre tall.
+pub(super) const MOST_LENGTH: f64 = 1000.0;
+/// Mass that a part may have, kg, and that a body which moves on its own has at least, with what is welded to it. Chosen:
+/// links that only carry joints are written with a milligram, and the heaviest animals have 150 tonnes.
+pub(super) const MOST_MASS: f64 = 1e6;
+const LEAST_MASS: f64 = 1e-9;
+/// Smallest moment of inertia of a body that moves on its own, kg·m²: MuJoCo's `mjMINVAL`, which its compiler asks for.
+const LEAST_INERTIA: f64 = 1e-15;
+/// Most degrees of freedom of a body: MuJoCo's compiler allows no more.
+const MOST_OF_BODY: usize = 6;
+/// Most degrees of freedom of a character. Chosen, as for the joints in the text (see [`super::guard`]).
+const MOST_FREEDOMS: usize = 256;
+
 /// What to do about numbers such as `nan` and `1e999`.
-const FINITE: &str = "write finite numbers";
+const FINITE: &str = "write finite numbers of at most 1000 m";
 
 /// The bodies of a character and the sizes of its coordinates.
 pub(super) struct Built {
@@ -21,14 +34,46 @@ pub(super) struct Built {
 
 /// Builds the bodies of `model`, parents before children. `skeleton` is the name for errors.
 pub(super) fn bodies(skeleton: &str, model: &Model) -> Result<Built, SkeletonError> {
+    check_option(skeleton, model)?;
+    actuators::check(skeleton, model)?;
     let mut builder = Builder::new(skeleton, model);
     builder.add_bodies()?;
     let Builder {
         mut bodies, nq, nv, ..
     } = builder;
+    if nv > MOST_FREEDOMS {
+        let cause =
+            format!("the character has {nv} degrees of freedom, at most {MOST_FREEDOMS} are read");
+        let defect = Defect::new(
+            cause,
+            "weld bodies that needn't move, by removing their joints",
+        );
+        return Err(SkeletonError::mjcf(skeleton, None, defect));
+    }
     set_total_mass(&mut bodies, model.compiler.set_total_mass);
     check_masses(skeleton, &bodies)?;
     Ok(Built { bodies, nq, nv })
+}
+
+/// The simulation has a gravity and a time step of its own, but a file that states impossible ones isn't to be believed.
+fn check_option(skeleton: &str, model: &Model) -> Result<(), SkeletonError> {
+    let option = &model.option;
+    let (cause, remedy) = match option.timestep > 0.0 {
+        false => ("its `timestep` is not positive", "write seconds above 0"),
+        true if option.gravity.iter().all(|x| x.is_finite()) => return Ok(()),
+        true => ("its `gravity` is not finite", "write three finite numbers"),
+    };
+    let defect = Defect::new(cause, remedy);
+    Err(SkeletonError::mjcf(
+        skeleton,
+        Some("<option>".to_owned()),
+        defect,
+    ))
+}
+
+/// Whether a point is near enough to be meant.
+pub(super) fn is_near(point: &Vector3<f64>) -> bool {
+    point.iter().all(|x| x.abs() <= MOST_LENGTH)
 }
 
 /// Collects the bodies of the character out of a parsed model.
@@ -72,6 +117,7 @@ impl<'a> Builder<'a> {
                 continue;
             }
             self.check_place(&name, parent.is_some(), free, joints.len())?;
+            self.check_freedoms(&name, joints)?;
             let body = self.body(name, parent, &entry.body)?;
             self.index[id] = Some(self.bodies.len());
             self.bodies.push(body);
@@ -120,6 +166,34 @@ impl<'a> Builder<'a> {
         Err(self.error(format!("body `{name}`"), Defect::new(cause, remedy)))
     }
 
+    /// Checks that the joints of a body aren't too many, and that each has a name of its own.
+    fn check_freedoms(&self, body: &str, joints: &[MjcfJoint]) -> Result<(), SkeletonError> {
+        let of_joint = |joint: &MjcfJoint| match joint.type_ {
+            JointType::Free => 6,
+            JointType::Ball => 3,
+            JointType::Hinge | JointType::Slide => 1,
+        };
+        let freedoms: usize = joints.iter().map(of_joint).sum();
+        if freedoms > MOST_OF_BODY {
+            let cause = format!("it has {freedoms} degrees of freedom");
+            let remedy = format!("keep at most {MOST_OF_BODY}, which is all that MuJoCo allows");
+            return Err(self.error(format!("body `{body}`"), Defect::new(cause, remedy)));
+        }
+        let before = self.bodies.iter().flat_map(|body| &body.joints);
+        let mut taken: Vec<&str> = before.map(|joint| joint.name.as_str()).collect();
+        for name in joints.iter().filter_map(|joint| joint.name.as_deref()) {
+            if taken.contains(&name) {
+                let defect = Defect::new(
+                    "the name is used twice",
+                    "give every joint a name of its own",
+                );
+                return Err(self.error(format!("joint `{name}` of body `{body}`"), defect));
+            }
+            taken.push(name);
+        }
+        Ok(())
+    }
+
     fn body(
         &mut self,
         name: String,
@@ -128,8 +202,9 @@ impl<'a> Builder<'a> {
     ) -> Result<Body, SkeletonError> {
         let place = format!("body `{name}`");
         let rest = isometry(&body.pose);
-        if !rest.to_homogeneous().iter().all(|x| x.is_finite()) {
-            let defect = Defect::new("its `pos` or rotation is not finite", FINITE);
+        let is_sound = rest.to_homogeneous().iter().all(|x| x.is_finite());
+        if !(is_sound && is_near(&rest.translation.vector)) {
+            let defect = Defect::new("its `pos` or rotation is not finite or too large", FINITE);
             return Err(self.error(place, defect));
         }
         let solids = self.solids(body, &place)?;
@@ -191,8 +266,10 @@ impl<'a> Builder<'a> {
             InertiaFromGeom::False | InertiaFromGeom::Auto => body.inertial.as_ref(),
         };
         let properties = match (stated, compiler.inertia_from_geom) {
-            (Some(inertial), _) => MassProperties::from_inertial(inertial)
-                .map_err(|defect| self.error(place, defect))?,
+            (Some(inertial), _) => {
+                MassProperties::from_inertial(inertial, compiler.balance_inertia)
+                    .map_err(|defect| self.error(place, defect))?
+            }
             (None, InertiaFromGeom::False) => MassProperties::from_solids(&[]),
             (None, _) => MassProperties::from_solids(solids),
         };
@@ -209,15 +286,16 @@ impl<'a> Builder<'a> {
             0 => body.to_owned(),
             n => format!("{body}_{n}"),
         });
-        let place = format!("joint `{name}`");
+        let place = format!("joint `{name}` of body `{body}`");
         if joint.ref_ != 0.0 {
             let defect = Defect::new("a `ref` offset is not supported", "set `ref` to 0");
             return Err(self.error(place, defect));
         }
         let kind = self.joint_kind(joint, &place)?;
         let anchor = Vector3::from(joint.pos);
-        if !anchor.iter().all(|x| x.is_finite()) {
-            return Err(self.error(place, Defect::new("its `pos` is not finite", FINITE)));
+        if !is_near(&anchor) {
+            let defect = Defect::new("its `pos` is not finite or too large", FINITE);
+            return Err(self.error(place, defect));
         }
         let (drives, limits) = drive::drives(joint, kind, self.model)
             .map_err(|defect| self.error(place.as_str(), defect))?;
@@ -262,23 +340,44 @@ fn larger(best: Option<f64>, next: f64) -> Option<f64> {
     Some(best.map_or(next, |b| b.max(next)))
 }
 
-/// Checks that every body that moves on its own has mass, in itself or in bodies welded to it.
+/// Checks that every body that moves on its own has mass, in itself or in bodies welded to it, and resists turning.
 fn check_masses(skeleton: &str, bodies: &[Body]) -> Result<(), SkeletonError> {
     let mut carried: Vec<f64> = bodies.iter().map(|b| b.mass).collect();
     // Parents come before their children, so from the last body on each welded mass reaches the body that moves it.
     for (index, body) in bodies.iter().enumerate().rev() {
         match body.parent {
             Some(parent) if body.joints.is_empty() => carried[parent] += carried[index],
-            _ if carried[index] > 0.0 => {}
-            _ => {
-                let place = format!("body `{}`", body.name);
-                let defect = Defect::new(
-                    "it moves but has no mass",
-                    "give it a geom or an <inertial>",
-                );
-                return Err(SkeletonError::mjcf(skeleton, Some(place), defect));
-            }
+            _ => check_mass(body, carried[index]).map_err(|defect| {
+                SkeletonError::mjcf(skeleton, Some(format!("body `{}`", body.name)), defect)
+            })?,
         }
+    }
+    Ok(())
+}
+
+/// Checks the mass of a body that moves on its own, given that mass and what is welded to it together.
+fn check_mass(body: &Body, carried: f64) -> Result<(), Defect> {
+    if carried < LEAST_MASS {
+        return Err(Defect::new(
+            "it moves but has no mass",
+            "give it a geom or an <inertial>",
+        ));
+    }
+    // Also after `settotalmass`.
+    if !(carried <= MOST_MASS) {
+        let cause = format!("its mass of {carried:e} kg is too large to use");
+        return Err(Defect::new(
+            cause,
+            format!("write at most {MOST_MASS:e} kg"),
+        ));
+    }
+    // What is welded to a body lends it inertia.
+    let least = body.inertia.symmetric_eigenvalues().min();
+    if carried == body.mass && !(least >= LEAST_INERTIA) {
+        return Err(Defect::new(
+            "it moves but has no inertia about one of its axes",
+            "write three positive numbers as `diaginertia` of its <inertial>",
+        ));
     }
     Ok(())
 }

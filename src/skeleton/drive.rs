@@ -1,10 +1,10 @@
 //! Drives and ranges of a joint's coordinates, from its actuators or, where it has none, from the joint itself.
 
-use super::error::Defect;
-use super::{Drive, JointKind};
-use mjcf_rs::Model;
+use super::error::{Defect, SkeletonError};
+use super::{Body, Drive, Joint, JointKind, Skeleton};
 use mjcf_rs::body::Joint as MjcfJoint;
 use mjcf_rs::extras::{Actuator, ActuatorKind};
+use mjcf_rs::{Model, Tristate};
 use std::f64::consts::PI;
 
 /// Stiffness of a joint that only a torque motor drives, per N·m of the motor's limit, 1/rad. Chosen: the drive reaches its
@@ -12,6 +12,9 @@ use std::f64::consts::PI;
 const KP_PER_FORCE: f64 = 4.0;
 /// Damping per stiffness of such a joint, s. It is the ratio of the built-in humanoid's drives.
 const KD_PER_KP: f64 = 0.1;
+
+/// Largest stiffness and damping of a drive. Chosen: a million times those of the built-in humanoid.
+const MOST_GAIN: f64 = 1e9;
 
 /// What one actuator does to one coordinate, in terms of that coordinate (its gear is resolved).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +39,7 @@ pub(super) fn drives(
     kind: JointKind,
     model: &Model,
 ) -> Result<(Vec<Drive>, Vec<[f64; 2]>), Defect> {
+    check_passive(joint)?;
     let dofs = match kind {
         JointKind::Free => 0,
         JointKind::Ball => 3,
@@ -45,7 +49,7 @@ pub(super) fn drives(
     let servos = model
         .actuators
         .iter()
-        .filter(|a| a.joint.is_some() && a.joint == joint.name)
+        .filter(|a| a.joint.is_some() && a.joint == joint.name && is_servo(a))
         .map(|a| servo(a, dofs, autolimits))
         .collect::<Result<Vec<_>, _>>()?;
     let mut drives = Vec::with_capacity(dofs);
@@ -56,10 +60,76 @@ pub(super) fn drives(
             .iter()
             .filter(|s| s.axis == axis)
             .max_by_key(|s| s.gains.is_some());
-        drives.push(drive(joint, servo));
+        drives.push(checked(drive(joint, servo))?);
         limits.push(limit(joint, kind, servo, model)?);
     }
     Ok((drives, limits))
+}
+
+impl Skeleton {
+    /// The first joint with a coordinate that nothing drives, and its body: no position actuator, no motor with a limit, and
+    /// no stiffness of its own. A policy can't move it.
+    pub fn undriven(&self) -> Option<(&Body, &Joint)> {
+        let is_idle = |drive: &Drive| drive.kp == 0.0 || drive.force_limit == 0.0;
+        self.bodies.iter().find_map(|body| {
+            let mut joints = body.joints.iter();
+            let joint = joints.find(|joint| joint.drives.iter().any(is_idle))?;
+            Some((body, joint))
+        })
+    }
+
+    /// The skeleton, if its joints have motors.
+    ///
+    /// A character that is read from a file is to perform what is retargeted to it. Without motors it can't, and hours of
+    /// training would tell that late.
+    pub(super) fn with_motors(self) -> Result<Self, SkeletonError> {
+        let Some((body, joint)) = self.undriven() else {
+            return Ok(self);
+        };
+        let place = format!("joint `{}` of body `{}`", joint.name, body.name);
+        let defect = Defect::new(
+            "no actuator drives it, and it has no stiffness of its own",
+            "add a <position> actuator for each of its axes, or a <motor> with a `ctrlrange`",
+        );
+        Err(SkeletonError::mjcf(&self.name, Some(place), defect))
+    }
+}
+
+/// Whether an actuator can be part of a position drive. The control of others is a velocity, or the pull of a muscle.
+fn is_servo(actuator: &Actuator) -> bool {
+    use ActuatorKind::{General, Motor, Position};
+    matches!(actuator.kind, Motor | Position | General)
+}
+
+/// Checks what a joint does by itself.
+fn check_passive(joint: &MjcfJoint) -> Result<(), Defect> {
+    let numbers = [
+        ("stiffness", joint.stiffness),
+        ("damping", joint.damping),
+        ("armature", joint.armature),
+        ("frictionloss", joint.frictionloss),
+    ];
+    match numbers.iter().find(|(_, number)| !(*number >= 0.0)) {
+        Some((name, number)) => Err(Defect::new(
+            format!("its `{name}` of {number} is negative"),
+            "write 0 or a positive number",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// The drive, if its gains are numbers that can be.
+fn checked(drive: Drive) -> Result<Drive, Defect> {
+    let Drive { kp, kd, .. } = drive;
+    match [kp, kd].iter().all(|gain| (0.0..=MOST_GAIN).contains(gain)) {
+        true => Ok(drive),
+        false => Err(Defect::new(
+            format!(
+                "its drive has the stiffness {kp} and the damping {kd}, which are negative or too large"
+            ),
+            format!("write gains that come to 0 to {MOST_GAIN:e} with the actuator's `gear`"),
+        )),
+    }
 }
 
 /// An actuator in terms of the coordinate q that it drives.
@@ -67,6 +137,12 @@ pub(super) fn drives(
 /// An actuator with gear g has length g·q and gives q the force g·f (MuJoCo, "Computation", "Transmission"), so in terms of
 /// q its gains scale with g², its force limit with g and its targets with 1/g.
 fn servo(actuator: &Actuator, dofs: usize, autolimits: bool) -> Result<Servo, Defect> {
+    if dofs == 0 {
+        return Err(Defect::new(
+            "an actuator drives it, but nothing can push the root from outside",
+            "remove the actuator",
+        ));
+    }
     let gears = actuator.gear.iter().take(dofs).enumerate();
     let mut along = gears.filter(|(_, g)| **g != 0.0);
     let (Some((axis, &gear)), None) = (along.next(), along.next()) else {
@@ -75,9 +151,7 @@ fn servo(actuator: &Actuator, dofs: usize, autolimits: bool) -> Result<Servo, De
             "give each axis an actuator of its own",
         ));
     };
-    let limited = |state: mjcf_rs::Tristate, range: Option<[f64; 2]>| {
-        range.filter(|_| state.resolve(autolimits, true))
-    };
+    let limited = |state, range| limited(state, range, autolimits);
     let ctrl = limited(actuator.ctrl_limited, actuator.ctrl_range);
     let force = limited(actuator.force_limited, actuator.force_range);
     let largest = |r: [f64; 2]| r[0].abs().max(r[1].abs());
@@ -108,6 +182,14 @@ fn servo_gains(actuator: &Actuator) -> Option<(f64, f64)> {
         }
         _ => None,
     }
+}
+
+/// A range, if it limits anything. In MuJoCo a range from 0 to 0 is one that isn't stated.
+fn limited(state: Tristate, range: Option<[f64; 2]>, autolimits: bool) -> Option<[f64; 2]> {
+    let states = |range: &[f64; 2]| state == Tristate::True || *range != [0.0, 0.0];
+    range
+        .filter(states)
+        .filter(|_| state.resolve(autolimits, true))
 }
 
 fn ordered(a: f64, b: f64) -> [f64; 2] {
@@ -150,9 +232,7 @@ fn limit(
     model: &Model,
 ) -> Result<[f64; 2], Defect> {
     let compiler = &model.compiler;
-    let range = joint
-        .range
-        .filter(|_| joint.limited.resolve(compiler.autolimits, true));
+    let range = limited(joint.limited, joint.range, compiler.autolimits);
     let own = match (kind, range) {
         (JointKind::Ball, Some([_, angle])) => {
             let unit = if compiler.angle_is_degree {

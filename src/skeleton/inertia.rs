@@ -1,6 +1,7 @@
 //! Mass properties of bodies, with MuJoCo's rules for `<inertial>`, geoms and the compiler's bounds.
 
 use super::Body;
+use super::build::{MOST_MASS, is_near};
 use super::error::Defect;
 use super::shape::{Solid, isometry};
 use mjcf_rs::body::{InertiaSpec, Inertial};
@@ -43,7 +44,8 @@ impl MassProperties {
     }
 
     /// The properties that `<inertial>` states, turned to the body's axes.
-    pub(super) fn from_inertial(inertial: &Inertial) -> Result<Self, Defect> {
+    /// With `balance`, which is MuJoCo's `balanceinertia`, three equal moments take the place of those that no body has.
+    pub(super) fn from_inertial(inertial: &Inertial, balance: bool) -> Result<Self, Defect> {
         let pose = isometry(&inertial.pose);
         let own = match inertial.inertia {
             InertiaSpec::Diagonal([x, y, z]) => Matrix3::from_diagonal(&Vector3::new(x, y, z)),
@@ -51,14 +53,24 @@ impl MassProperties {
                 Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
             }
         };
+        let own = match is_of_a_body(&own) {
+            true => own,
+            false if balance => Matrix3::from_diagonal_element(own.trace() / 3.0),
+            false => {
+                return Err(Defect::new(
+                    "no body has the inertia of its <inertial>",
+                    "write moments that are not negative, none larger than the other two together",
+                ));
+            }
+        };
         // From the inertial frame's axes to the body's.
         let r = pose.rotation.to_rotation_matrix();
         let inertia = r * own * r.transpose();
-        let finite = inertial.mass.is_finite() && inertia.iter().all(|x| x.is_finite());
-        if !finite || inertial.mass < 0.0 {
+        let finite = inertia.iter().all(|x| x.is_finite()) && is_near(&pose.translation.vector);
+        if !(finite && (0.0..=MOST_MASS).contains(&inertial.mass)) {
             return Err(Defect::new(
-                "the mass or inertia of its <inertial> is negative or not finite",
-                "write finite numbers that are not negative",
+                "the mass, inertia or place of its <inertial> is negative, not finite or too large",
+                format!("write a mass from 0 to {MOST_MASS:e} kg, and finite numbers"),
             ));
         }
         Ok(Self {
@@ -80,6 +92,14 @@ impl MassProperties {
         }
         self
     }
+}
+
+/// Whether a tensor is the inertia of some body: its principal moments are not negative, and none exceeds the sum of the
+/// others. Chosen: a part in a hundred is rounding, because files are written with few digits.
+fn is_of_a_body(inertia: &Matrix3<f64>) -> bool {
+    let moments = inertia.symmetric_eigenvalues();
+    let (most, all) = (moments.max(), moments.sum());
+    moments.min() >= -1e-9 * most.abs() && most <= 1.01 * (all - most)
 }
 
 /// Inertia about the origin of a point mass at `offset`, m (|r|² 1 − r rᵀ): what the parallel axis theorem adds.

@@ -11,10 +11,6 @@ use mjcf_rs::Model;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
-/// Most bytes that are read of an MJCF file or of the slots beside it. Chosen: the largest humanoids of MuJoCo Menagerie
-/// have fifty thousand, and the parser takes a multiple of that in memory and time.
-const MOST_BYTES: u64 = 1 << 20;
-
 /// Characters compiled into the library: name, MJCF, slots as JSON.
 const BUILT_IN: [(&str, &str, &str); 3] = [
     (
@@ -35,6 +31,9 @@ const BUILT_IN: [(&str, &str, &str); 3] = [
 ];
 
 impl Skeleton {
+    /// Most bytes that are read of an MJCF file, and of the slots beside it.
+    pub const MOST_BYTES: u64 = guard::MOST_BYTES;
+
     /// Names of the built-in characters, which [`Skeleton::load`] takes.
     pub fn built_in() -> impl Iterator<Item = &'static str> {
         BUILT_IN.iter().map(|(name, ..)| *name)
@@ -43,7 +42,7 @@ impl Skeleton {
     /// Loads a built-in character by name, or an MJCF file by path.
     ///
     /// The humanoid slots of `dir/robot.xml` are read from `dir/robot.json` if that file exists, and otherwise guessed from
-    /// the names of the bodies (see [`Skeleton::from_mjcf`]).
+    /// the names of the bodies (see [`Skeleton::from_mjcf`]). Something has to drive each joint of a file's character.
     ///
     /// # Errors
     /// [`SkeletonError::UnknownName`] for a word that is neither a built-in character nor a file,
@@ -65,6 +64,7 @@ impl Skeleton {
         let json = beside.exists().then(|| read(&beside)).transpose()?;
         let name = path.file_stem().unwrap_or(path.as_os_str());
         Self::from_mjcf(&name.to_string_lossy(), &xml, json.as_deref())
+            .and_then(Self::with_motors)
             .map_err(|error| error.in_files(path, &beside))
     }
 
@@ -86,7 +86,7 @@ impl Skeleton {
         xml: &str,
         slots_json: Option<&str>,
     ) -> Result<Self, SkeletonError> {
-        guard::check(xml).map_err(|defect| SkeletonError::mjcf(name, None, defect))?;
+        guard::check(name, xml)?;
         let model = Model::from_str(xml, ".").map_err(|e| {
             let defect = Defect::new(format!("not valid MJCF ({})", one_line(&e)), OPENS);
             SkeletonError::mjcf(name, None, defect)
@@ -110,7 +110,7 @@ impl Skeleton {
 }
 
 fn read(path: &Path) -> Result<String, SkeletonError> {
-    file::text_at_most(path, MOST_BYTES).map_err(|source| SkeletonError::Read {
+    file::text_at_most(path, Skeleton::MOST_BYTES).map_err(|source| SkeletonError::Read {
         path: path.to_owned(),
         source,
     })

@@ -16,6 +16,7 @@
 //! # Ok::<(), mimic::skeleton::SkeletonError>(())
 //! ```
 
+mod actuators;
 mod build;
 mod coordinates;
 mod drive;

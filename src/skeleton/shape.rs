@@ -1,6 +1,7 @@
 //! MJCF geoms as solids, with exact mass properties, and the sphere, capsule or box that stands for each in contacts.
 
 use super::Shape;
+use super::build::{MOST_LENGTH, MOST_MASS, is_near};
 use super::error::Defect;
 use mjcf_rs::Pose;
 use mjcf_rs::body::{Geom, GeomType};
@@ -48,16 +49,29 @@ impl Solid {
         if matches!(geom.type_, GeomType::Plane | GeomType::Hfield) {
             return Ok(None);
         }
+        if geom.friction.iter().any(|number| !(*number >= 0.0)) {
+            return Err(Defect::new(
+                "a number of its `friction` is negative or not finite",
+                "write 0 or positive numbers",
+            ));
+        }
         let (pose, size) = placed(geom)?;
+        let is_sound = pose.to_homogeneous().iter().all(|x| x.is_finite());
+        if !(is_sound && is_near(&pose.translation.vector)) {
+            return Err(Defect::new(
+                "its `pos`, `fromto` or rotation is not finite or too large",
+                format!("write finite numbers of at most {MOST_LENGTH} m"),
+            ));
+        }
         let form = form(geom.type_, size)?;
         let mass = match geom.mass {
             Some(mass) => mass,
             None => form.volume() * geom.density.unwrap_or(DEFAULT_DENSITY),
         };
-        if !(mass >= 0.0 && mass.is_finite()) {
+        if !(0.0..=MOST_MASS).contains(&mass) {
             return Err(Defect::new(
-                format!("its mass {mass} is negative or not finite"),
-                "write a finite mass that is not negative",
+                format!("its mass of {mass:.4e} kg is negative or too large"),
+                format!("write a mass from 0 to {MOST_MASS:e} kg, or a `density` that makes one"),
             ));
         }
         Ok(Some(Self {
@@ -154,10 +168,14 @@ fn form(kind: GeomType, size: [f64; 3]) -> Result<Form, Defect> {
             ));
         }
     };
-    if size.iter().take(used).any(|s| !(*s > 0.0 && s.is_finite())) {
+    if size
+        .iter()
+        .take(used)
+        .any(|s| !(*s > 0.0 && *s <= MOST_LENGTH))
+    {
         return Err(Defect::new(
-            "a number of its `size` is missing, not positive or not finite",
-            format!("write {used} positive number(s)"),
+            "a number of its `size` is missing, not positive or too large",
+            format!("write {used} positive number(s) of at most {MOST_LENGTH} m"),
         ));
     }
     let [a, b, c] = size;

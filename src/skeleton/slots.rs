@@ -19,18 +19,23 @@ pub(super) fn from_json(text: &str, bodies: &[Body]) -> Result<BTreeMap<Slot, us
             r#"write them as {"slots": {"hips": "pelvis"}}"#,
         )
     })?;
-    file.slots
-        .into_iter()
-        .map(|(slot, name)| {
-            let body = bodies.iter().position(|b| b.name == name);
-            body.map(|b| (slot, b)).ok_or_else(|| {
-                Defect::new(
-                    format!("no body is called `{name}`"),
-                    "use names of bodies of the MJCF file",
-                )
-            })
-        })
-        .collect()
+    let mut slots: BTreeMap<Slot, usize> = BTreeMap::new();
+    for (slot, name) in file.slots {
+        let body = bodies.iter().position(|body| body.name == name);
+        let body = body.ok_or_else(|| {
+            Defect::new(
+                format!("no body is called `{name}`"),
+                "use names of bodies of the MJCF file",
+            )
+        })?;
+        if let Some((other, _)) = slots.iter().find(|(_, taken)| **taken == body) {
+            let (other, slot) = (other.name(), slot.name());
+            let cause = format!("body `{name}` is both `{other}` and `{slot}`");
+            return Err(Defect::new(cause, "keep it in one of them"));
+        }
+        slots.insert(slot, body);
+    }
+    Ok(slots)
 }
 
 /// Guesses slots from the names of the bodies. Of several bodies for one slot, the first takes it.

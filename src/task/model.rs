@@ -2,7 +2,7 @@
 
 use super::error::TaskError;
 use crate::humanoid::Slot;
-use crate::sim::{Character, Link, LinkState};
+use crate::sim::{Character, Link, LinkState, SimError};
 use crate::skeleton::{GRAVITY, Shape, Skeleton};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -47,6 +47,10 @@ impl CharacterModel {
     /// # Errors
     /// A skeleton that can't be simulated, or one without legs, whose size can't be told.
     pub fn new(skeleton: Skeleton) -> Result<Self, TaskError> {
+        if let Some((body, joint)) = skeleton.undriven() {
+            let (body, joint) = (body.name.clone(), joint.name.clone());
+            return Err(SimError::Undriven { body, joint }.into());
+        }
         let character = Character::new(&skeleton)?;
         let ends = [
             Slot::LeftHand,

@@ -1,30 +1,37 @@
 //! Damaged copies of real files: reading them never panics, ends soon, and takes no more memory than their size allows.
 //!
 //! `many_inputs` reads as many copies as `MIMIC_FUZZ_INPUTS` says, of the seed `MIMIC_FUZZ_SEED`, from number `MIMIC_FUZZ_FIRST`
-//! on. Those that fail are kept in `MIMIC_FUZZ_FOLDER`.
+//! on, of the kinds that `MIMIC_FUZZ_KINDS` lists, with commas between them. Those that fail are kept in `MIMIC_FUZZ_FOLDER`.
 
 mod fbx;
 mod glb;
 mod heap;
 mod json;
+mod ours;
 mod plain;
 mod random;
 mod seeds;
+mod targets;
+mod tensors;
 mod text;
 
-use mimic::import::{self, Options};
+use mimic::clip::Joint;
+use mimic::import::Options;
 use random::Random;
 use seeds::Seed;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
+use targets::With;
 
-/// Bytes that reading may take for each byte of the file, and for any file: a few bytes can ask for many frames, and a reader's
-/// tables have the same size for every file.
+/// Bytes that reading may take for each byte of a binary file and of a text, and for any file: a few bytes can ask for many
+/// frames, and a reader's tables have the same size for every file.
 const PER_BYTE: usize = 64;
-const FREE: usize = 32 << 20;
+const PER_LETTER: usize = 16;
+const FREE: usize = 64 << 20;
+/// How long reading any file may take, and how much longer for each MiB.
 const SOON: Duration = Duration::from_secs(1);
 /// A reading that takes this long counts as endless.
 const NEVER: u64 = 120;
@@ -37,7 +44,7 @@ struct Tally {
     inputs: u64,
     read: u64,
     longest: Duration,
-    /// Most bytes in use at once, and most of them beyond [`PER_BYTE`].
+    /// Most bytes in use at once, and most of them beyond what each byte of the file allows.
     peak: usize,
     excess: usize,
 }
@@ -49,6 +56,8 @@ struct Run {
     seed: u64,
     /// A motion, beside which damaged skeletons are put.
     motion: Vec<u8>,
+    /// The joints that damaged maps are for.
+    joints: Vec<Joint>,
     /// For files that have to be on a disk.
     folder: tempfile::TempDir,
     kept: PathBuf,
@@ -76,6 +85,11 @@ fn watch(start: Instant) {
 impl Run {
     fn new(seed: u64, kept: PathBuf) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
+        let wanted = std::env::var("MIMIC_FUZZ_KINDS").ok();
+        let wanted = |kind: &str| {
+            let mut kinds = wanted.iter().flat_map(|list| list.split(','));
+            wanted.is_none() || kinds.any(|name| name == kind)
+        };
         let seeds = seeds::all();
         let bytes = |kind: &str| {
             seeds
@@ -87,7 +101,8 @@ impl Run {
             std::fs::write(folder.path().join("01.asf"), skeleton).expect("it is written");
         }
         let motion = bytes("AMC").unwrap_or_default();
-        let mut kinds: Vec<_> = seeds.iter().map(|s| s.kind).collect();
+        let kinds = seeds.iter().map(|s| s.kind);
+        let mut kinds: Vec<_> = kinds.filter(|kind| wanted(kind)).collect();
         kinds.sort_unstable();
         kinds.dedup();
         Self {
@@ -96,6 +111,7 @@ impl Run {
             kinds,
             seed,
             motion,
+            joints: ours::clip().joints,
             folder,
             kept,
             failures: 0,
@@ -131,7 +147,9 @@ impl Run {
         };
         let seen = self.seen(seed, &bytes, &options);
         let (name, size) = (seed.name.clone(), bytes.len() + seed.beside);
-        let excess = seen.peak.saturating_sub(PER_BYTE * size);
+        let per_byte = if seed.is_text() { PER_LETTER } else { PER_BYTE };
+        let excess = seen.peak.saturating_sub(per_byte * size);
+        let soon = SOON.mul_f64(1.0 + size as f64 / f64::from(1 << 20));
         if let Some(tally) = self.tallies.get_mut(kind) {
             tally.inputs += 1;
             tally.read += u64::from(seen.read);
@@ -139,7 +157,7 @@ impl Run {
             tally.peak = tally.peak.max(seen.peak);
             tally.excess = tally.excess.max(excess);
         }
-        let slow = || (seen.seconds > SOON).then(|| format!("it takes {:.1?}", seen.seconds));
+        let slow = || (seen.seconds > soon).then(|| format!("it takes {:.1?}", seen.seconds));
         let large = || (excess > FREE).then(|| format!("{} bytes for {size}", seen.peak));
         if let Some(fault) = seen.fault.clone().or_else(slow).or_else(large) {
             self.keep(&format!("{}-{input}-{name}", self.seed), &bytes);
@@ -162,11 +180,16 @@ impl Run {
             "glTF" => &seed.folder,
             _ => self.folder.path(),
         };
-        let mut seen = attempt(name, read, folder, options);
+        let with = With {
+            folder,
+            options,
+            joints: &self.joints,
+        };
+        let mut seen = attempt(seed.kind, name, read, &with);
         // Other programs may have taken the time, so what seems to be a record is looked at again.
         if seen.seconds > self.tallies[seed.kind].longest {
             let before = on_processor();
-            let again = attempt(name, read, folder, options).seconds;
+            let again = attempt(seed.kind, name, read, &with).seconds;
             let busy = before.and_then(|before| on_processor()?.checked_sub(before));
             seen.seconds = busy.unwrap_or(again);
         }
@@ -180,7 +203,9 @@ impl Run {
     }
 
     fn report(&self) {
-        eprintln!("format: inputs, read, longest ms, most MiB, MiB beyond {PER_BYTE} × size");
+        eprintln!(
+            "kind: inputs, read, longest ms, most MiB, MiB beyond {PER_BYTE} × size, {PER_LETTER} × for texts"
+        );
         let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
         for (kind, tally) in &self.tallies {
             eprintln!(
@@ -209,26 +234,18 @@ struct Seen {
     fault: Option<String>,
 }
 
-fn attempt(name: &str, bytes: &[u8], folder: &Path, options: &Options) -> Seen {
+fn attempt(kind: &str, name: &str, bytes: &[u8], with: &With) -> Seen {
     let start = Instant::now();
-    let read = || import::read(bytes, name, Some(folder), options);
+    let read = || targets::read(kind, name, bytes, with);
     let (result, peak) = heap::peak_of(|| catch_unwind(AssertUnwindSafe(read)));
     let seconds = start.elapsed();
     let fault = match &result {
         Err(_) => Some("it panics".to_owned()),
-        Ok(Err(error)) => {
-            let text = error.to_string();
+        Ok(Err(text)) => {
             let clear = text.starts_with('`') && text.len() < 2000 && !text.contains(['\n', '\r']);
             (!clear).then(|| format!("no clear line: {text:.300?}"))
         }
-        Ok(Ok(clip)) => {
-            let finite =
-                |t: &nalgebra::Isometry3<f64>| t.to_homogeneous().iter().all(|x| x.is_finite());
-            let whole =
-                |frame: &Vec<_>| frame.len() == clip.joints.len() && frame.iter().all(finite);
-            let whole = !clip.frames.is_empty() && clip.frames.iter().all(whole);
-            (!whole).then(|| "the clip isn't whole".to_owned())
-        }
+        Ok(Ok(flaw)) => flaw.map(str::to_owned),
     };
     Seen {
         read: matches!(result, Ok(Ok(_))),

@@ -3,8 +3,9 @@
 use super::fbx::Fbx;
 use super::glb::Glb;
 use super::random::Random;
+use super::tensors::Tensors;
 use super::text::Text;
-use super::{json, plain};
+use super::{json, ours, plain};
 use mimic_test_support::foreign;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -77,6 +78,19 @@ const THEIRS: [(&str, &str); 47] = [
     ("DeepMimic", "deepmimic/dog3d_trot.txt"),
 ];
 
+/// Kinds that are texts, which may take less memory.
+const TEXTS: [&str; 9] = [
+    "AMC",
+    "ASCII FBX",
+    "ASF",
+    "BVH",
+    "DeepMimic",
+    "MJCF",
+    "glTF",
+    "joint map",
+    "slots",
+];
+
 /// How many bytes of a long motion are used: its first lines.
 const AMC_BYTES: usize = 20_000;
 
@@ -85,6 +99,7 @@ enum Form {
     Fbx(Fbx),
     Glb(Glb),
     Json(Value),
+    Tensors(Tensors),
     Text(Text),
 }
 
@@ -110,11 +125,18 @@ pub fn all() -> Vec<Seed> {
     let files = ours.into_iter().chain(theirs);
     let can_be_read = |kind: &str| cfg!(feature = "ufbx") || !kind.ends_with(" FBX");
     let files = files.filter(|(kind, _)| can_be_read(kind));
-    files.filter_map(|(kind, path)| seed(kind, &path)).collect()
+    let imported = files.filter_map(|(kind, path)| {
+        let bytes = std::fs::read(&path).expect("a seed can be read");
+        seed(kind, &path, bytes)
+    });
+    let made = ours::all();
+    let made = made
+        .into_iter()
+        .filter_map(|(kind, name, bytes)| seed(kind, Path::new(name), bytes));
+    imported.chain(made).collect()
 }
 
-fn seed(kind: &'static str, path: &Path) -> Option<Seed> {
-    let mut bytes = std::fs::read(path).expect("a seed can be read");
+fn seed(kind: &'static str, path: &Path, mut bytes: Vec<u8>) -> Option<Seed> {
     if kind == "AMC" {
         let end = bytes.iter().take(AMC_BYTES).rposition(|&b| b == b'\n');
         bytes.truncate(end.map_or(0, |end| end + 1));
@@ -143,12 +165,21 @@ fn form(kind: &str, bytes: &[u8]) -> Option<Form> {
     Some(match kind {
         "FBX" | "old FBX" => Form::Fbx(Fbx::parse(bytes)?),
         "GLB" | "VRM" => Form::Glb(Glb::parse(bytes)?),
-        "glTF" | "DeepMimic" => Form::Json(serde_json::from_slice(bytes).ok()?),
+        "glTF" | "DeepMimic" | "joint map" | "slots" => {
+            Form::Json(serde_json::from_slice(bytes).ok()?)
+        }
+        "clip" | "motion" => Form::Tensors(Tensors::parse(bytes)?),
+        "MJCF" => Form::Text(Text::xml(bytes)),
         _ => Form::Text(Text::new(bytes)),
     })
 }
 
 impl Seed {
+    /// Whether the file is a text.
+    pub fn is_text(&self) -> bool {
+        TEXTS.contains(&self.kind)
+    }
+
     /// A damaged copy: two of three keep to the format's structure.
     pub fn damaged(&self, random: &mut Random) -> Vec<u8> {
         let mut bytes = self.bytes.clone();
@@ -160,6 +191,7 @@ impl Seed {
             Form::Fbx(fbx) => fbx.mutated(random),
             Form::Glb(glb) => glb.mutated(random),
             Form::Json(value) => json::mutated(value, random),
+            Form::Tensors(tensors) => tensors.mutated(random),
             Form::Text(text) => {
                 text.mutate(&mut bytes, random);
                 bytes

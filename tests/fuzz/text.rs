@@ -1,4 +1,4 @@
-//! Damage to texts, word by word and line by line: BVH, ASF, AMC and ASCII FBX.
+//! Damage to texts, word by word and line by line: BVH, ASF, AMC, ASCII FBX and MJCF.
 
 use super::random::Random;
 use std::ops::Range;
@@ -34,7 +34,19 @@ pub struct Text {
 }
 
 impl Text {
+    /// A text whose words are apart by blanks and commas.
     pub fn new(bytes: &[u8]) -> Self {
+        Self::cut(bytes, |byte| byte.is_ascii_whitespace() || byte == b',')
+    }
+
+    /// An XML text, whose words are names, and what stands in the values of attributes.
+    pub fn xml(bytes: &[u8]) -> Self {
+        Self::cut(bytes, |byte| {
+            byte.is_ascii_whitespace() || b"\"'=<>/".contains(&byte)
+        })
+    }
+
+    fn cut(bytes: &[u8], is_space: fn(u8) -> bool) -> Self {
         let ends = |cut: fn(u8) -> bool| -> Vec<usize> {
             let places = (0..bytes.len()).filter(|&at| cut(bytes[at]));
             places.chain([bytes.len()]).collect()
@@ -47,7 +59,6 @@ impl Text {
                 .filter(|part| !part.is_empty())
                 .collect()
         };
-        let is_space = |byte: u8| byte.is_ascii_whitespace() || byte == b',';
         Self {
             words: between(ends(is_space), 0),
             lines: between(ends(|byte| byte == b'\n'), 1),

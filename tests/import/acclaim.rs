@@ -4,6 +4,7 @@
 use super::acclaim_reference::{asf, places};
 use super::bvh::{Place, agrees, evaluate};
 use super::damage::Damage;
+use mimic::explain::Explain;
 use mimic::humanoid::{self, Slot};
 use mimic::import::{self, Options};
 use mimic_test_support::foreign;
@@ -377,4 +378,27 @@ fn damaged_files_are_refused_or_read_whole() {
         }
     }
     assert!(refused > 0);
+}
+
+/// A skeleton without a bone is named, not the motion that it lies beside.
+#[test]
+fn a_broken_skeleton_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let motion = folder.path().join("a.amc");
+    std::fs::write(&motion, ":FULLY-SPECIFIED\n:DEGREES\n1\nroot 0 0 0 0 0 0\n").expect("written");
+    let beside = folder.path().join("b.asf");
+    for text in ["", "# nothing\n", ":root\n", ":bonedata\nbegin\n", "\u{0}"] {
+        std::fs::write(&beside, text).expect("written");
+        let told = import::load(&motion, &Options::default())
+            .expect_err("refused")
+            .explain();
+        assert_eq!(told.file.as_ref(), Some(&beside), "{text:?}: {told}");
+    }
+    let Some(case) = foreign("../cases/solid/amc-beside-empty-asf/A_empty_asf.amc") else {
+        return;
+    };
+    let told = import::load(&case, &Options::default())
+        .expect_err("refused")
+        .explain();
+    assert_eq!(told.file, Some(case.with_file_name("s.asf")), "{told}");
 }

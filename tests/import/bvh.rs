@@ -236,6 +236,24 @@ fn broken_files_are_refused_by_line() {
         ("offset 0 1e0 0", "offset 0 up 0", 3, "`up`"),
         ("xrotation Xposition", "wrotation Xposition", 8, "wrotation"),
         ("channels 6", "channels 7", 4, "7"),
+        ("Frames: 3", "Frames: many", 12, "`many`"),
+        ("Frames: 3", "Frames: -3", 12, "`-3`"),
+        (" }\r\n}\r\nMotion", " }\r\nMotion", 10, "`Hip Joint`"),
+        (
+            " }\r\n}\r\nMotion",
+            " }\r\nroot B {\r\n}\r\nMotion",
+            10,
+            "`Hip Joint`",
+        ),
+        (
+            "ZPOSITION\r\n",
+            "ZPOSITION\r\nCHANNELS 1 Zrotation\r\n",
+            9,
+            "CHANNELS",
+        ),
+        ("90 0 0 0 0 0,5 0", "90 0 0 0 0 0,5", 14, "9 numbers"),
+        ("90 0 0 0 0 0,5 0", "90 0 0 0 0 0,5 0 0", 14, "11 numbers"),
+        ("2.5E-1 0", "2.5E-1 0 0 0", 15, "12 numbers"),
         ("Frame Time:", "Frame Rate:", 13, "Rate"),
         ("0,5 0", "0,5 nan", 14, "nan"),
         (" joint Tip\r\n", " joint Tip\r\n}\r\n", 6, "`}`"),
@@ -287,4 +305,86 @@ fn figures_that_stand_along_another_axis_are_set_upright() {
         let taken = import::load(Path::new(&path), &word).expect("it imports");
         assert_eq!(taken.source.up_axis, "+Y", "{name}: the option counts");
     }
+}
+
+/// Rows of `lengths` numbers under a header that counts `count` frames of four numbers.
+fn rows(lengths: &[usize], count: &str) -> Result<Clip, String> {
+    let numbers = |length: &usize| format!("{}\n", vec!["1"; *length].join(" "));
+    let rows: String = lengths.iter().map(numbers).collect();
+    read(&format!(
+        "HIERARCHY\nROOT a\n{{\nOFFSET 0 0 0\nCHANNELS 4 Xposition Yposition Zposition Zrotation\n}}\nMOTION\nFrames: {count}\n\
+        Frame Time: 0.04\n{rows}"
+    ))
+}
+
+#[test]
+fn rows_are_frames_or_are_refused() {
+    let told = |clip: &Clip, id: &str| clip.problems.iter().any(|p| p.id == id);
+    // Frames that share lines, or take several, are believed where the header counts them.
+    for lengths in [&[4, 4, 4][..], &[12], &[8, 4], &[1; 12], &[2, 2, 3, 1, 4]] {
+        let clip = rows(lengths, "3").expect("it imports");
+        assert_eq!(clip.frames.len(), 3, "{lengths:?}");
+        assert!(!told(&clip, "frame-count") && !told(&clip, "frame-cut"));
+    }
+    for (lengths, count, line) in [
+        (&[6, 6, 6][..], "3", 10),
+        (&[4, 3, 5], "4", 11),
+        (&[4, 5, 4], "3", 11),
+        (&[8, 8, 8], "3", 10),
+        (&[2, 2, 2, 2], "4", 10),
+        (&[4, 4, 6], "3", 12),
+        (&[3], "1", 10),
+    ] {
+        let said = rows(lengths, count).expect_err("refused");
+        assert!(
+            said.contains(&format!("line {line}: this row has")),
+            "{lengths:?}: {said}"
+        );
+    }
+    for count in ["2", "4", "1000000000", "18446744073709551615"] {
+        let clip = rows(&[4, 4, 4], count).expect("it imports");
+        assert_eq!(clip.frames.len(), 3);
+        assert!(told(&clip, "frame-count"), "{count}");
+    }
+    let cut = rows(&[4, 4, 1], "3").expect("it imports");
+    assert!(cut.frames.len() == 2 && told(&cut, "frame-cut") && told(&cut, "frame-count"));
+}
+
+/// Old machines end lines with a carriage return alone.
+#[test]
+fn lines_may_end_in_carriage_returns() {
+    let text = AWKWARD.replace("\r\n", "\r");
+    assert_eq!(read(&text).expect("it imports").frames.len(), 2);
+    let said = read(&text.replace("0,5 0", "0,5 nan")).expect_err("refused");
+    assert!(said.contains("line 14"), "{said}");
+}
+
+/// The examples of others.
+#[test]
+fn known_faults_are_told_by_line() {
+    let folder = "../cases/solid/bvh-";
+    for (name, says) in [
+        (
+            "12-numbers-per-9-channel-row-read-as-4-frames",
+            "line 19: this row has 12 numbers",
+        ),
+        (
+            "missing-closing-brace-accepted",
+            "line 15: the block of joint `Hips`",
+        ),
+    ] {
+        let Some(path) = foreign(&format!("{folder}{name}.bvh")) else {
+            return;
+        };
+        let said = import::load(path, &Options::default())
+            .expect_err(name)
+            .to_string();
+        assert!(said.contains(says), "{said}");
+    }
+    let Some(path) = foreign(&format!("{folder}frames-1e9-misleading-message.bvh")) else {
+        return;
+    };
+    let clip = import::load(path, &Options::default()).expect("it imports");
+    let problem = clip.problems.iter().find(|p| p.id == "frame-count");
+    assert!(problem.is_some_and(|p| p.message.contains("1000000000")));
 }

@@ -3,6 +3,7 @@
 use super::gltf_made::{base64, synthetic};
 use mimic::clip::Clip;
 use mimic::import::{self, Options};
+use mimic_test_support::foreign;
 use serde_json::{Value, json};
 
 fn read(bytes: &[u8]) -> Result<Clip, import::Error> {
@@ -108,6 +109,41 @@ fn a_few_bytes_cannot_ask_for_millions_of_transforms() {
     let error = refusal(text.as_bytes());
     assert!(
         error.contains("`turn`") && error.contains("keep a part"),
+        "{error}"
+    );
+}
+
+/// 2³² isn't the first entry of a list.
+#[test]
+fn indices_beyond_any_list_are_refused() {
+    let big = json!(1_u64 << 32);
+    let places: [(&str, &dyn Fn(&mut Value)); 5] = [
+        ("node", &|f| {
+            f["animations"][0]["channels"][0]["target"]["node"] = big.clone()
+        }),
+        ("sampler", &|f| {
+            f["animations"][0]["channels"][0]["sampler"] = big.clone()
+        }),
+        ("input", &|f| {
+            f["animations"][0]["samplers"][0]["input"] = big.clone()
+        }),
+        ("bufferView", &|f| {
+            f["accessors"][0]["bufferView"] = big.clone()
+        }),
+        ("children", &|f| f["nodes"][0]["children"] = json!([big])),
+    ];
+    for (key, change) in places {
+        let error = read(synthetic(change).as_bytes())
+            .expect_err(key)
+            .to_string();
+        assert!(error.contains(&format!("`{key}` is 4294967296")), "{error}");
+    }
+    let Some(path) = foreign("../cases/solid/gltf-index-2pow32-wraps-to-0.gltf") else {
+        return;
+    };
+    let error = import::load(path, &Options::default()).expect_err("refused");
+    assert!(
+        error.to_string().contains("`node` is 4294967296"),
         "{error}"
     );
 }

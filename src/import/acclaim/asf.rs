@@ -94,7 +94,10 @@ pub(super) fn read(text: &str) -> Result<Skeleton, AcclaimError> {
             _ => {}
         }
     }
-    reader.skeleton()
+    match reader.bones.is_empty() {
+        true => Err(AcclaimError::NoBones),
+        false => reader.skeleton(),
+    }
 }
 
 impl Draft {

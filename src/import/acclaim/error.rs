@@ -29,6 +29,8 @@ pub(crate) enum AcclaimError {
         reason: String,
         remedy: &'static str,
     },
+    /// A skeleton without bones.
+    NoBones,
     /// An AMC file without motion.
     NoFrames,
 }
@@ -56,6 +58,8 @@ impl Explain for AcclaimError {
                 reason,
                 remedy,
             } => at(line, reason).remedy(remedy),
+            Self::NoBones => Explanation::input("no bones, where an Acclaim skeleton has some")
+                .remedy("write or download the skeleton again"),
             Self::NoFrames => Explanation::input("no frames").remedy("write the file again"),
         }
     }

@@ -17,6 +17,14 @@ pub(crate) enum BvhError {
     Channel { line: usize, found: String },
     /// More joints than are read.
     TooMany { line: usize, most: usize },
+    /// A joint whose block has no end.
+    Unclosed { line: usize, joint: String },
+    /// A row of numbers that isn't a frame.
+    Row {
+        line: usize,
+        found: usize,
+        width: usize,
+    },
     /// A hierarchy in which nothing can move.
     NoChannels,
     /// A hierarchy without motion.
@@ -45,6 +53,18 @@ impl Explain for BvhError {
             Self::TooMany { line, most } => {
                 at(line, format!("more than {most} joints")).remedy("split the file")
             }
+            Self::Unclosed { line, joint } => at(
+                line,
+                format!("the block of joint `{joint}` is still open here"),
+            )
+            .remedy("add the missing `}`"),
+            Self::Row { line, found, width } => at(
+                line,
+                format!(
+                    "this row has {found} numbers, and the channels of the joints need {width}"
+                ),
+            )
+            .remedy("repair that line, or the channels, or write the file again"),
             Self::NoChannels => wrong("the hierarchy has no channels, so nothing can move"),
             Self::NoFrames => wrong("no frames follow the hierarchy"),
         }

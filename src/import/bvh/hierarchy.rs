@@ -4,8 +4,8 @@ use super::error::BvhError;
 use super::words::Words;
 use nalgebra::Vector3;
 
-/// Most joints that a file may have. Chosen, as a bound on memory.
-const MOST_JOINTS: usize = 1 << 16;
+/// Most joints that a file may have. Chosen, as a bound on memory: crowds have thousands.
+const MOST_JOINTS: usize = 1 << 14;
 
 /// One number of a frame: along or about an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,15 +38,16 @@ pub(super) fn hierarchy(words: &mut Words) -> Result<Vec<Joint>, BvhError> {
     loop {
         let word = words.expect("MOTION")?;
         match word.to_ascii_uppercase().as_str() {
+            "ROOT" if !open.is_empty() => return Err(unclosed(words, &joints, &open)),
             "ROOT" | "JOINT" => {
                 let name = words.name();
-                begin(words, &mut joints, &mut open, name, width)?;
+                begin(words, &mut joints, &mut open, name)?;
             }
             // "End Site", sometimes with a name.
             "END" => {
                 let site = words.name();
                 let name = end_name(&joints, &open, &site);
-                begin(words, &mut joints, &mut open, name, width)?;
+                begin(words, &mut joints, &mut open, name)?;
             }
             "OFFSET" => {
                 let offset = [0, 1, 2].map(|_| words.number("an offset of three numbers"));
@@ -55,28 +56,40 @@ pub(super) fn hierarchy(words: &mut Words) -> Result<Vec<Joint>, BvhError> {
                 last(words, &mut joints, &open, word)?.offset = offset;
             }
             "CHANNELS" => {
-                let channels = channels(words)?;
-                width += channels.len();
-                last(words, &mut joints, &open, word)?
-                    .channels
-                    .extend(channels);
+                let joint = last(words, &mut joints, &open, word)?;
+                // A frame's numbers stand in the order of these lists, so a second one of a joint would be apart from it.
+                if !joint.channels.is_empty() {
+                    return Err(words.unexpected(word, "the rest of the joint"));
+                }
+                joint.first = width;
+                joint.channels = channels(words)?;
+                width += joint.channels.len();
             }
             "}" => {
                 open.pop().ok_or_else(|| words.unexpected("}", "a joint"))?;
             }
+            "MOTION" if !open.is_empty() => return Err(unclosed(words, &joints, &open)),
             "MOTION" if !joints.is_empty() => return Ok(joints),
             _ => return Err(words.unexpected(word, "ROOT, JOINT, OFFSET, CHANNELS, } or MOTION")),
         }
     }
 }
 
-/// Opens the block of a new joint, whose numbers begin at `first`.
+/// The error of a block that should have ended before this.
+fn unclosed(words: &Words, joints: &[Joint], open: &[usize]) -> BvhError {
+    let joint = open.last().and_then(|&joint| joints.get(joint));
+    BvhError::Unclosed {
+        line: words.line,
+        joint: joint.map_or_else(String::new, |joint| joint.name.clone()),
+    }
+}
+
+/// Opens the block of a new joint.
 fn begin(
     words: &mut Words,
     joints: &mut Vec<Joint>,
     open: &mut Vec<usize>,
     name: String,
-    first: usize,
 ) -> Result<(), BvhError> {
     words.keyword("{")?;
     if joints.len() >= MOST_JOINTS {
@@ -90,7 +103,7 @@ fn begin(
         parent: open.last().copied(),
         offset: Vector3::zeros(),
         channels: Vec::new(),
-        first,
+        first: 0,
     });
     open.push(joints.len() - 1);
     Ok(())

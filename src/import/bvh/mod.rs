@@ -1,10 +1,11 @@
 //! BVH (Biovision hierarchy): a text with a tree of joints, their offsets and channels, and a row of numbers per frame.
 //!
 //! There is no standard, so this reads what programs write: channels in any order and on any joint, several roots,
-//! joints without an end site, any line ends and letter case, and rows that disagree with the header's count.
+//! joints without an end site, any line ends and letter case, and frames that disagree with the header's count.
 
 mod error;
 mod hierarchy;
+mod rows;
 mod words;
 
 use super::measure::{Scale, rate_of_frame_time, rest};
@@ -14,6 +15,7 @@ use crate::clip::Problem;
 use error::BvhError;
 use hierarchy::{Channel, Joint, hierarchy};
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
+use rows::{Rows, rows};
 use words::Words;
 
 /// Rate of a file whose frame time can't be used, Hz. Chosen.
@@ -42,9 +44,12 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<BvhScene, BvhError> {
     }
     let mut problems = Vec::new();
     let (count, rate) = header(&mut words, &mut problems)?;
-    let numbers = numbers(&mut words, width, &mut problems)?;
+    let Rows {
+        numbers,
+        problems: of_rows,
+    } = rows(&mut words, width, count)?;
+    problems.extend(of_rows);
     let frames = numbers.len() / width;
-    problems.extend(other_count(count, frames));
     let scale = Scale::guess(&rest(
         joints.iter().map(|joint| (joint.parent, joint.offset)),
     ));
@@ -75,9 +80,11 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<BvhScene, BvhError> {
 }
 
 /// The number of frames that the header states, and the frame rate by its frame time, Hz.
-fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(f64, f64), BvhError> {
+fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(u64, f64), BvhError> {
     words.keyword("Frames:")?;
-    let count = words.number("a number of frames")?;
+    let expected = "a whole number of frames";
+    let word = words.expect(expected)?;
+    let count = word.parse().map_err(|_| words.unexpected(word, expected))?;
     words.keyword("Frame")?;
     words.keyword("Time:")?;
     let word = words.expect("a frame time")?;
@@ -92,40 +99,6 @@ fn header(words: &mut Words, problems: &mut Vec<Problem>) -> Result<(f64, f64), 
         USUAL_RATE
     });
     Ok((count, rate))
-}
-
-/// The numbers of all complete frames.
-fn numbers(
-    words: &mut Words,
-    width: usize,
-    problems: &mut Vec<Problem>,
-) -> Result<Vec<f64>, BvhError> {
-    let mut numbers = Vec::new();
-    while let Some(word) = words.next() {
-        numbers.push(words.parsed(word, "a number")?);
-    }
-    // A file that was cut off ends within a frame.
-    let over = numbers.len() % width;
-    if over > 0 {
-        problems.push(Problem::warning(
-            "frame-cut",
-            format!("the last frame has {over} of {width} numbers and is left out; the file may be cut off"),
-        ));
-    }
-    numbers.truncate(numbers.len() - over);
-    match numbers.is_empty() {
-        true => Err(BvhError::NoFrames),
-        false => Ok(numbers),
-    }
-}
-
-fn other_count(stated: f64, found: usize) -> Option<Problem> {
-    (stated != found as f64).then(|| {
-        Problem::note(
-            "frame-count",
-            format!("the header counts {stated} frames, but {found} follow: these were read"),
-        )
-    })
 }
 
 impl BvhScene {

@@ -7,7 +7,7 @@ const MOST: f64 = 1e9;
 
 /// The words of a text, one after the other. Line ends are blanks to the format, except after a joint's name.
 pub(super) struct Words<'a> {
-    lines: std::iter::Enumerate<std::str::Lines<'a>>,
+    lines: std::iter::Enumerate<std::str::Split<'a, char>>,
     /// Line of the last word, counted from 1.
     pub line: usize,
     rest: &'a str,
@@ -16,8 +16,10 @@ pub(super) struct Words<'a> {
 impl<'a> Words<'a> {
     pub fn new(text: &'a str) -> Self {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        // A lone carriage return ends a line in files from old machines.
+        let end = if text.contains('\n') { '\n' } else { '\r' };
         Self {
-            lines: text.lines().enumerate(),
+            lines: text.split(end).enumerate(),
             line: 1,
             rest: "",
         }
@@ -25,7 +27,6 @@ impl<'a> Words<'a> {
 
     /// The next word; a brace is a word of its own.
     pub fn next(&mut self) -> Option<&'a str> {
-        // A lone carriage return ends a line in files from old machines.
         let space = |c: char| c.is_whitespace() || c == '\0';
         loop {
             self.rest = self.rest.trim_start_matches(space);
@@ -46,6 +47,13 @@ impl<'a> Words<'a> {
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest;
         Some(word)
+    }
+
+    /// How many words are left, if none of them is a brace.
+    pub fn left(&self) -> usize {
+        let lines = self.lines.clone().map(|(_, line)| line);
+        let words = |line: &str| line.split_whitespace().count();
+        words(self.rest) + lines.map(words).sum::<usize>()
     }
 
     /// The words up to the end of the line or a brace, as one name.

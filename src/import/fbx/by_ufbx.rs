@@ -14,12 +14,13 @@ use std::time::{Duration, Instant};
 use ufbx::{AllocatorOpts, ElementType, LoadOpts, OpenFileCb, ProgressCb, ProgressResult};
 
 /// Bytes that ufbx may allocate for any file, and how many more per byte of the file: once for what it keeps, and once for what
-/// it needs while reading. Chosen. It uses Rust's allocator.
+/// it needs while reading. Chosen: a text may take less. It uses Rust's allocator.
 const FREE_BYTES: usize = 8 << 20;
-const BYTES_PER_BYTE: usize = 32;
-/// Longest time that reading may take, and after how many bytes the clock is checked. Chosen: files of a gigabyte take
-/// seconds.
-const MOST_TIME: Duration = Duration::from_secs(60);
+const BYTES_PER_BYTE: usize = 31;
+const BYTES_PER_LETTER: usize = 7;
+/// Longest time that reading may take for any file and for each MiB of it, and after how many bytes the clock is checked.
+/// Chosen: files of a gigabyte take seconds.
+const MOST_TIME: Duration = Duration::from_secs(1);
 const LOOK_EVERY: u64 = 1 << 16;
 
 /// Most look-ups that all takes together may need to place the nodes once: ufbx looks up every node, and every property that
@@ -75,15 +76,20 @@ pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
 
 /// Reads the bytes, and no other file.
 fn load(bytes: &[u8]) -> Result<ufbx::SceneRoot, FbxError> {
+    let per_byte = match super::is_ascii(bytes) {
+        true => BYTES_PER_LETTER,
+        false => BYTES_PER_BYTE,
+    };
     let limit = || AllocatorOpts {
         memory_limit: bytes
             .len()
-            .saturating_mul(BYTES_PER_BYTE)
+            .saturating_mul(per_byte)
             .saturating_add(FREE_BYTES),
         ..AllocatorOpts::default()
     };
     let start = Instant::now();
-    let in_time = |_: &ufbx::Progress| match start.elapsed() < MOST_TIME {
+    let most_time = MOST_TIME.mul_f64(1.0 + bytes.len() as f64 / f64::from(1 << 20));
+    let in_time = |_: &ufbx::Progress| match start.elapsed() < most_time {
         true => ProgressResult::Continue,
         false => ProgressResult::Cancel,
     };

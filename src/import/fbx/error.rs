@@ -37,7 +37,7 @@ impl Explain for FbxError {
             Explanation::input(format!(
                 "{kind}, which this build can't read without the feature `ufbx`"
             ))
-            .remedy("save it as binary FBX 7.4 or newer")
+            .remedy("save it as binary FBX 7.4 or 7.5")
         };
         let broken = |reason: &str, place: String| {
             Explanation::input(reason)
@@ -53,7 +53,7 @@ impl Explain for FbxError {
             #[cfg(feature = "ufbx")]
             Self::Ufbx { reason } => {
                 Explanation::input(format!("broken FBX, as ufbx reads it: {reason}"))
-                    .remedy("export it again, best as binary FBX 7.4 or newer")
+                    .remedy("export it again, best as binary FBX 7.4 or 7.5")
             }
             Self::Broken { place, reason } => {
                 broken(&format!("broken FBX: {reason}"), place.clone())

@@ -10,6 +10,9 @@ use std::path::{Component, Path, PathBuf};
 /// Most bytes that all external buffers of a file may have together. Chosen, as for the file itself.
 const MOST_BYTES: u64 = 2 << 30;
 
+/// One part in how many counts of the bytes that a text holds.
+const TEXT_SHARE: usize = 4;
+
 /// Buffers, each read when it is first needed: a missing buffer of a mesh doesn't keep the motion from being read.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
@@ -42,13 +45,23 @@ impl<'a> Buffers<'a> {
                 cause: format!("buffer {buffer}: {}", fault.cause),
                 ..fault
             })?;
-            self.bytes = self.bytes.saturating_add(bytes.len());
+            // A text may take less memory than a binary file of its size.
+            let share = if self.is_text(buffer) { TEXT_SHARE } else { 1 };
+            self.bytes = self.bytes.saturating_add(bytes.len() / share);
             self.fetched.insert(buffer, bytes);
         }
         Ok(self.fetched.get(&buffer).map_or(&[], |bytes| bytes))
     }
 
-    /// How many bytes have been read.
+    /// Whether the file's text itself holds this buffer.
+    fn is_text(&self, buffer: usize) -> bool {
+        let about = self.document.buffers.get(buffer);
+        let uri = about.and_then(|about| about.uri.as_deref());
+        let scheme = uri.and_then(|uri| uri.split_once(':'));
+        scheme.is_some_and(|(scheme, _)| scheme.eq_ignore_ascii_case("data"))
+    }
+
+    /// How many bytes have been read, of which those within a text count a quarter.
     pub fn bytes(&self) -> usize {
         self.bytes
     }

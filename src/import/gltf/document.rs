@@ -4,6 +4,7 @@
 //! imported. The entries are those of [`gltf::json`], which checks their types but not their indices.
 
 use super::error::GltfError;
+use super::indices;
 use gltf::json::animation::{Property, Sampler};
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Accessor, Buffer, Index, Node, Skin, buffer};
@@ -28,6 +29,7 @@ pub(super) struct Document {
     pub buffer_views: Vec<buffer::View>,
     #[serde(deserialize_with = "bounded::<_, _, MOST_ENTRIES>")]
     pub buffers: Vec<Buffer>,
+    #[serde(deserialize_with = "bounded::<_, _, MOST_NAMES>")]
     pub extensions_required: Vec<String>,
     #[serde(skip)]
     extended: Extended,
@@ -40,6 +42,8 @@ pub(super) struct Document {
 /// hundreds of bytes here.
 const MOST_NODES: usize = 1 << 15;
 const MOST_ENTRIES: usize = 1 << 17;
+/// Most extensions that a file may require. Chosen: there are some hundred.
+const MOST_NAMES: usize = 1 << 10;
 
 /// A list of at most `MOST` entries.
 fn bounded<'de, D, T, const MOST: usize>(list: D) -> Result<Vec<T>, D::Error>
@@ -231,6 +235,7 @@ pub(super) fn parse(json: &[u8]) -> Result<Document, GltfError> {
             found: stamp.asset.version,
         });
     }
+    indices::check(json).map_err(broken)?;
     let document: Document = serde_json::from_slice(json)
         .or_else(|e| serde_json::from_slice(&without_extras(json)).map_err(|_| e))
         .map_err(broken)?;

@@ -7,6 +7,7 @@ mod container;
 mod curve;
 mod document;
 mod error;
+mod indices;
 mod rate;
 mod take;
 mod tree;

@@ -1,6 +1,7 @@
 //! What carrying a motion back onto its source's rig will need: the rig, and the motion of joints that no body follows.
 
 use crate::clip::stored::rounded;
+use crate::humanoid::Slot;
 use crate::motion::SourceRig;
 use crate::retarget::input::Input;
 use crate::skeleton::Skeleton;
@@ -16,9 +17,12 @@ const STILL: f64 = 1e-5;
 pub(super) fn source_rig(input: &Input, skeleton: &Skeleton) -> SourceRig {
     let Input { clip, own, map, .. } = input;
     let slots = map.matches.iter().map(|(slot, found)| (*slot, found.joint));
-    let followed = slots
-        .clone()
-        .filter(|(slot, _)| skeleton.slots.contains_key(slot));
+    // A body that is welded to its parent can't turn as its joint does.
+    let follows = |slot: &Slot| {
+        let body = skeleton.slots.get(slot);
+        body.is_some_and(|&body| !skeleton.bodies[body].joints.is_empty())
+    };
+    let followed = slots.clone().filter(|(slot, _)| follows(slot));
     let followed: BTreeSet<usize> = followed.map(|(_, joint)| joint).collect();
     let mut source = SourceRig {
         joints: clip.joints.clone(),
@@ -51,7 +55,6 @@ fn shift(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::clip::{Clip, Joint};
-    use crate::humanoid::Slot;
     use crate::import;
     use crate::motion::Motion;
     use crate::retarget::{Options, retarget};

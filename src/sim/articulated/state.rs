@@ -54,6 +54,9 @@ impl State {
         self.impulses.fill(Vector3::zeros());
         self.pushes.clear();
         (self.mass, self.friction) = (1.0, 1.0);
+        for (target, node) in self.targets.iter_mut().zip(&tree.nodes) {
+            *target = rest(&node.joint);
+        }
         for (i, node) in tree.nodes.iter().enumerate() {
             let state = &states[i];
             let velocity = &mut self.velocity[node.first..node.first + node.dof];

@@ -1,11 +1,14 @@
 //! DeepMimic motion files: JSON with one row of 44 numbers per frame, for one humanoid that isn't in the file (Peng et al.,
 //! "DeepMimic", 2018).
 
+mod rows;
+
 use super::measure::whole_rate;
 use super::scene::{Contents, Node, Scene, Take, composed};
 use crate::clip::{MOST_FPS, Problem, slerp};
 use crate::explain::{Explain, Explanation, explained};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
+use rows::Rows;
 
 /// Numbers in one frame: duration in seconds, root position in metres, root rotation, then the joints in the order of
 /// [`JOINTS`].
@@ -137,7 +140,7 @@ struct File {
     #[serde(rename = "Loop")]
     loops: Option<String>,
     #[serde(rename = "Frames")]
-    frames: Vec<Vec<f64>>,
+    frames: Rows,
 }
 
 /// A DeepMimic motion on its humanoid.
@@ -152,7 +155,7 @@ pub(crate) fn read(bytes: &[u8], name: &str) -> Result<DeepMimicScene, DeepMimic
     let file: File = serde_json::from_slice(bytes).map_err(|e| DeepMimicError::Json {
         reason: e.to_string(),
     })?;
-    let poses = poses(&file.frames)?;
+    let poses = poses(file.frames)?;
     let mut problems = Vec::new();
     let wraps = loop_word(file.loops.as_deref(), &mut problems);
     let end = poses.last().map_or(0.0, |pose| pose.time);
@@ -196,7 +199,13 @@ fn loop_word(word: Option<&str>, problems: &mut Vec<Problem>) -> Option<bool> {
     }
 }
 
-fn poses(rows: &[Vec<f64>]) -> Result<Vec<Pose>, DeepMimicError> {
+fn poses(rows: Rows) -> Result<Vec<Pose>, DeepMimicError> {
+    match rows.odd {
+        Some((_, DOG_ROW)) => return Err(DeepMimicError::Dog),
+        Some((frame, found)) => return Err(DeepMimicError::Width { frame, found }),
+        None => {}
+    }
+    let rows = rows.numbers.as_chunks::<ROW>().0;
     let mut poses = Vec::with_capacity(rows.len());
     let mut time = 0.0;
     for (frame, row) in rows.iter().enumerate() {
@@ -218,12 +227,7 @@ fn poses(rows: &[Vec<f64>]) -> Result<Vec<Pose>, DeepMimicError> {
     Ok(poses)
 }
 
-fn pose(frame: usize, row: &[f64], time: f64) -> Result<Pose, DeepMimicError> {
-    match row.len() {
-        ROW => {}
-        DOG_ROW => return Err(DeepMimicError::Dog),
-        found => return Err(DeepMimicError::Width { frame, found }),
-    }
+fn pose(frame: usize, row: &[f64; ROW], time: f64) -> Result<Pose, DeepMimicError> {
     // Chosen: whatever is larger is damage, and sums and products of smaller numbers stay finite.
     if !row.iter().all(|x| x.abs() < 1e9) {
         return Err(DeepMimicError::Magnitude { frame });
