@@ -364,7 +364,7 @@ fn check_mass(body: &Body, carried: f64) -> Result<(), Defect> {
         ));
     }
     // Also after `settotalmass`.
-    if !(carried <= MOST_MASS) {
+    if carried.is_nan() || carried > MOST_MASS {
         let cause = format!("its mass of {carried:e} kg is too large to use");
         return Err(Defect::new(
             cause,
@@ -373,7 +373,7 @@ fn check_mass(body: &Body, carried: f64) -> Result<(), Defect> {
     }
     // What is welded to a body lends it inertia.
     let least = body.inertia.symmetric_eigenvalues().min();
-    if carried == body.mass && !(least >= LEAST_INERTIA) {
+    if carried == body.mass && (least.is_nan() || least < LEAST_INERTIA) {
         return Err(Defect::new(
             "it moves but has no inertia about one of its axes",
             "write three positive numbers as `diaginertia` of its <inertial>",

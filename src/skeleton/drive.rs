@@ -109,7 +109,10 @@ fn check_passive(joint: &MjcfJoint) -> Result<(), Defect> {
         ("armature", joint.armature),
         ("frictionloss", joint.frictionloss),
     ];
-    match numbers.iter().find(|(_, number)| !(*number >= 0.0)) {
+    match numbers
+        .iter()
+        .find(|(_, number)| number.is_nan() || *number < 0.0)
+    {
         Some((name, number)) => Err(Defect::new(
             format!("its `{name}` of {number} is negative"),
             "write 0 or a positive number",

@@ -49,7 +49,7 @@ impl Solid {
         if matches!(geom.type_, GeomType::Plane | GeomType::Hfield) {
             return Ok(None);
         }
-        if geom.friction.iter().any(|number| !(*number >= 0.0)) {
+        if geom.friction.iter().any(|x| x.is_nan() || *x < 0.0) {
             return Err(Defect::new(
                 "a number of its `friction` is negative or not finite",
                 "write 0 or positive numbers",

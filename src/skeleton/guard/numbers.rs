@@ -59,7 +59,7 @@ pub(super) fn check(name: &str, value: &str) -> Result<(), Defect> {
         return Ok(());
     }
     let numbers = || value.split_ascii_whitespace().flat_map(str::parse::<f64>);
-    if let Some(wrong) = numbers().find(|x| !(x.abs() <= MOST)) {
+    if let Some(wrong) = numbers().find(|x| x.is_nan() || x.abs() > MOST) {
         let cause = match wrong.is_finite() {
             true => format!("its `{name}` has the number {wrong:e}, which is too large to use"),
             false => format!("its `{name}` has the number {wrong}, which is not finite"),
