@@ -93,15 +93,16 @@ impl Bind {
     /// The page of a recording, for a browser: `page` has the viewer, `data` the recording.
     pub fn page_address(&self, page: u16, data: u16) -> String {
         let (page, data) = (reachable(self.place(page)), reachable(self.place(data)));
-        // In a query, `+`, `:` and `/` are escaped.
+        // In a query, such characters are escaped.
         let data = data.to_string().replace(':', "%3A");
+        let data = data.replace('[', "%5B").replace(']', "%5D");
         format!("http://{page}/?url=rerun%2Bhttp%3A%2F%2F{data}%2Fproxy")
     }
 
-    /// From which pages a browser may fetch the recording, beside those of this machine. The viewer lets no others.
+    /// From which pages a browser may fetch the recording, beside those of 127.0.0.1. The viewer lets no others.
     pub fn origin(&self, page: u16) -> Option<String> {
         match self.ip {
-            ip if ip.is_loopback() => None,
+            ip if ip == Ipv4Addr::LOCALHOST => None,
             ip if ip.is_unspecified() => Some(format!("http://*:{page}")),
             _ => Some(format!("http://{}", self.place(page))),
         }
@@ -205,6 +206,14 @@ mod tests {
         assert_eq!(address, expected);
         assert_eq!(bind.origin(9090).as_deref(), Some("http://*:9090"));
         assert_eq!(Bind::default().origin(9090), None);
+        let bind: Bind = "::1".parse().expect("an address");
+        let address = bind.page_address(9090, 9876);
+        assert!(address.starts_with("http://[::1]:9090/"), "{address}");
+        assert!(
+            address.ends_with("%2F%5B%3A%3A1%5D%3A9876%2Fproxy"),
+            "{address}"
+        );
+        assert_eq!(bind.origin(9090).as_deref(), Some("http://[::1]:9090"));
     }
 
     #[test]
