@@ -268,7 +268,9 @@ pub fn absent_run(wanted: &Path) -> Failure {
     };
     let cause = match wanted.is_file() {
         true => "this is a file, and a run is a folder".to_owned(),
-        false => format!("there is no run here or in `{RUNS}/`"),
+        false if is_name(wanted) => format!("there is no run here or in `{RUNS}/`"),
+        false if wanted.is_dir() => "there is no run in this folder".to_owned(),
+        false => "there is no such folder".to_owned(),
     };
     Failure::input(wanted, cause).with_remedy(remedy)
 }

@@ -119,9 +119,7 @@ impl Printer {
     /// Says what was found in a file: warnings and errors always, notes with `--verbose`.
     pub fn problems(&self, problems: &[Problem]) {
         for problem in problems {
-            let flag = problem.parameter().and_then(flag);
-            let flag = flag.map_or_else(String::new, |flag| format!(" (`{flag}`)"));
-            let line = format!("{}{flag} [{}]", problem.message, problem.id);
+            let line = words(problem);
             match problem.severity {
                 Severity::Note => self.detail(format!("note: {line}")),
                 Severity::Warning | Severity::Error => self.warn(line),
@@ -139,11 +137,12 @@ impl Printer {
             .flat_map(|(file, problems)| problems.iter().map(move |p| (file, p)));
         let (notes, warnings): (Vec<_>, Vec<_>) =
             all.partition(|(_, problem)| problem.severity == Severity::Note);
-        for (file, Problem { id, message, .. }) in notes {
-            self.detail(format!("note: `{file}`: {message} [{id}]"));
+        for (file, note) in notes {
+            self.detail(format!("note: `{file}`: {}", words(note)));
         }
         let mut said = BTreeSet::new();
-        for (file, Problem { id, message, .. }) in &warnings {
+        for (file, problem) in &warnings {
+            let id = &problem.id;
             if !said.insert(id) {
                 continue;
             }
@@ -152,7 +151,7 @@ impl Printer {
                 0 => String::new(),
                 more => format!(", and {more} more like it"),
             };
-            self.warn(format!("`{file}`: {message} [{id}]{more}"));
+            self.warn(format!("`{file}`: {}{more}", words(problem)));
         }
     }
 
@@ -205,6 +204,15 @@ impl Printer {
         } else {
             text.to_string()
         }
+    }
+}
+
+/// A problem in words, with the flag that decides otherwise and its id.
+fn words(problem: &Problem) -> String {
+    let Problem { id, message, .. } = problem;
+    match problem.parameter().and_then(flag) {
+        Some(flag) => format!("{message} (`{flag}`) [{id}]"),
+        None => format!("{message} [{id}]"),
     }
 }
 

@@ -60,11 +60,6 @@ impl Unfinished {
         self.file.as_file_mut()
     }
 
-    /// Where it is for now, for writers that want a path.
-    pub fn path(&self) -> &Path {
-        self.file.path()
-    }
-
     /// Flushes it to the disk and gives it its name, in place of the file that had it.
     ///
     /// # Errors
@@ -206,7 +201,7 @@ mod tests {
         kept.sort();
         let mut file = Unfinished::beside(at("new.txt")).expect("made");
         file.file().write_all(b"new").expect("written");
-        assert!(file.path().exists());
+        assert!(file.file.path().exists());
         drop(file);
         assert_eq!(names(folder.path()), kept);
     }

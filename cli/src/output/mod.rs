@@ -90,16 +90,6 @@ impl Output {
         })
     }
 
-    /// Lets `write` write to a path of its own, with what made it.
-    pub fn write_by(&self, write: impl FnOnce(&Path, Option<&str>) -> Outcome) -> Outcome {
-        self.make_folder()?;
-        self.check()?;
-        let mark = self.mark();
-        let file = Unfinished::beside(&self.path).map_err(|e| self.unwritten(e))?;
-        write(file.path(), mark.as_deref())?;
-        self.settle(file, mark.as_deref())
-    }
-
     /// Gives the file its name. A file that appeared there since the check is refused as it would have been then.
     fn settle(&self, file: Unfinished, mark: Option<&str>) -> Outcome {
         if self.force || self.is_ours(mark) {

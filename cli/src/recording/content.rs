@@ -9,7 +9,6 @@ use mimic::motion::{Motion, Tracks};
 use mimic::skeleton::{Shape, Skeleton};
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
-use std::path::PathBuf;
 
 /// The side of the body that a part belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,19 +19,6 @@ pub enum Side {
     Middle,
     /// The character's right.
     Right,
-}
-
-/// Where a recording goes.
-pub enum Sink {
-    /// An `.rrd` file.
-    File {
-        /// Where it is.
-        path: PathBuf,
-        /// What made it, which its id says.
-        made: Option<String>,
-    },
-    /// The address of a viewer that listens, e.g. `rerun+http://127.0.0.1:9876/proxy`.
-    Viewer(String),
 }
 
 /// One body of the character as it is drawn.

@@ -1,6 +1,6 @@
 //! Recordings for the rerun viewer.
 //!
-//! A [`Recording`] holds in plain numbers who moves how; [`write()`] turns it into what the viewer shows. Only the latter
+//! A [`Recording`] holds in plain numbers who moves how; the room `rrd` turns it into what the viewer shows. Only the latter
 //! needs the rerun crate and its dependencies, which a build without the feature `rerun` leaves out.
 
 mod content;
@@ -9,9 +9,9 @@ mod performance;
 mod rrd;
 mod save;
 
-pub use content::{Recording, Sink};
-pub use rrd::write;
-pub use save::{save, save_to, write_file};
+pub use content::Recording;
+pub use rrd::send;
+pub use save::{bytes, save, save_to};
 
 use crate::failure::{Failure, Outcome};
 

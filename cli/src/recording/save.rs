@@ -1,30 +1,23 @@
 //! Recordings as files.
 
-use super::content::{Recording, Sink};
-use super::rrd::write;
+use super::content::Recording;
+use super::rrd;
 use crate::failure::{Failure, Outcome};
 use crate::output::Output;
-use mimic::file::Unfinished;
 use std::path::Path;
 
 /// Writes the recording of a run into its folder, in place of an older one.
 pub fn save(shown: &Recording, path: &Path) -> Outcome {
-    let failed = |e| Failure::write(path, e);
-    let part = Unfinished::beside(path).map_err(failed)?;
-    write_file(shown, part.path(), path, None)?;
-    part.replace().map_err(failed)
+    mimic::file::replace(path, &bytes(shown, None)?).map_err(|e| Failure::write(path, e))
 }
 
 /// Writes the recording where a command was told to.
 pub fn save_to(shown: &Recording, output: &Output) -> Outcome {
-    output.write_by(|part, made| write_file(shown, part, output.path(), made))
+    output.write(|made| bytes(shown, made))
 }
 
-/// Writes into `part`, which becomes `path`.
-pub fn write_file(shown: &Recording, part: &Path, path: &Path, made: Option<&str>) -> Outcome {
-    let sink = Sink::File {
-        path: part.to_path_buf(),
-        made: made.map(str::to_owned),
-    };
-    write(shown, &sink).map_err(|e| Failure::write(path, e))
+/// The bytes of a file with the recording, which says what made it.
+pub fn bytes(shown: &Recording, made: Option<&str>) -> Outcome<Vec<u8>> {
+    rrd::bytes(shown, made)
+        .map_err(|e| Failure::work(format!("the recording cannot be made ({e})")))
 }

@@ -1,12 +1,20 @@
 //! In place of `rrd` in a build without the feature `rerun`.
 
-use super::content::{Recording, Sink};
+use super::content::Recording;
 use std::error::Error;
 
-/// Writes nothing: callers ask [`require`](super::require) first.
+/// Makes nothing: callers ask [`require`](super::require) first.
 ///
 /// # Errors
 /// Always.
-pub fn write(_: &Recording, _: &Sink) -> Result<(), Box<dyn Error>> {
+pub fn bytes(_: &Recording, _: Option<&str>) -> Result<Vec<u8>, Box<dyn Error>> {
+    Err("built without the feature `rerun`".into())
+}
+
+/// Sends nothing, as above.
+///
+/// # Errors
+/// Always.
+pub fn send(_: &Recording, _: &str) -> Result<(), Box<dyn Error>> {
     Err("built without the feature `rerun`".into())
 }

@@ -213,7 +213,7 @@ pub fn rows(map: &HumanoidMap, joints: &[Joint]) -> Vec<Row> {
 fn text(report: &Report) -> String {
     let mut text = format!(
         "{}: {}, {} up, {} m per unit, {} joints\n",
-        report.file,
+        plain(&report.file),
         report.format,
         report.up_axis,
         amount::digits(report.unit_m),

@@ -6,7 +6,7 @@ use crate::locate;
 use crate::output::{Form, Maker, Output, names_folder, result_path};
 use crate::prepare::Preparation;
 use crate::printer::Printer;
-use crate::recording::{self, Recording, Sink};
+use crate::recording::{self, Recording};
 use crate::runs;
 use crate::viewer::{self, Bind, Viewer};
 use clap::builder::NonEmptyStringValueParser;
@@ -14,6 +14,7 @@ use mimic::evaluate::Options;
 use mimic::explain::plain;
 use mimic::task::{EpisodeStart, StartState};
 use serde_json::json;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -352,7 +353,7 @@ fn send(shown: &Recording, address: String) -> Outcome {
         Failure::work(format!("cannot send the recording to `{address}`: {e}"))
             .with_remedy("check that the viewer still runs, or write it to a file with `--save`")
     };
-    recording::write(shown, &Sink::Viewer(address.clone())).map_err(failed)
+    recording::send(shown, &address).map_err(failed)
 }
 
 /// Serves it from a temporary file until Ctrl-C. `ready` gets the address.
@@ -365,7 +366,8 @@ fn serve(
     let failed = |e| Failure::write(&std::env::temp_dir(), e);
     let mut builder = tempfile::Builder::new();
     let file = builder.prefix("mimic-").suffix(".rrd").tempfile();
-    let file = file.map_err(failed)?;
-    recording::write_file(shown, file.path(), file.path(), None)?;
+    let mut file = file.map_err(failed)?;
+    file.write_all(&recording::bytes(shown, None)?)
+        .map_err(failed)?;
     viewer.serve(file.path(), bind, ready)
 }

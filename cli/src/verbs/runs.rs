@@ -71,6 +71,7 @@ impl Args {
         let mut entries: Vec<Entry> = folders(folder)?.iter().map(|run| entry(run)).collect();
         entries.sort_by(|a, b| (a.learned, &a.run).cmp(&(b.learned, &b.run)));
         let place = folder.unwrap_or(Path::new(locate::RUNS)).display();
+        let place = plain(&place.to_string());
         printer.result(&json!({ "runs": entries }), || match entries.is_empty() {
             true => format!("there are no runs in `{place}`; make one with `mimic train CLIP`"),
             false => text(&entries),

@@ -133,6 +133,7 @@ fn so_are_names_of_files_and_of_what_is_made_of_them() {
     let motion = format!("sway{name}.motion");
     let (csv, svg) = (format!("{name}.csv"), format!("{name}.svg"));
     let missing = format!("no{name}.fbx");
+    let run = format!("runs/{name}");
     for line in [
         &["info", &file][..],
         &["import", &file, "--out", &clip],
@@ -150,6 +151,11 @@ fn so_are_names_of_files_and_of_what_is_made_of_them() {
         &["import", &file, &missing],
         &["tracks", &missing],
         &["train", &motion, "--preset", "tiny.json", "--verbose"],
+        &["train", &motion, "--preset", "tiny.json", "--out", &run],
+        &["train", &motion, "--preset", "tiny.json", "--out", &run],
+        &["train", "--resume", &run],
+        &["runs"],
+        &["plot", &run],
         &["eval", "--episodes", "2", "--seconds", "1", "--verbose"],
         &["plot"],
         &["eval", &missing],

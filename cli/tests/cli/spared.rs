@@ -329,6 +329,40 @@ fn of_several_at_once_one_writes() {
     assert!(leftovers(&bench).is_empty());
 }
 
+/// A full disk is said, also by what other libraries write for us; nothing is left half written.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_failed_work() {
+    let bench = Workbench::with_clip();
+    // A limit on the size of files stands in for the disk: 8 blocks of half a kilobyte.
+    let limited = |line: &[&str]| {
+        let program = assert_cmd::cargo::cargo_bin("mimic");
+        std::process::Command::new("sh")
+            .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
+            .arg(program)
+            .args(line)
+            .current_dir(bench.path("."))
+            .output()
+            .expect("it runs")
+    };
+    for line in [
+        &["import", "sway.txt"][..],
+        &["retarget", "sway.txt"],
+        &["tracks", "sway.txt", "--plot", "sway.svg"],
+        #[cfg(feature = "rerun")]
+        &["replay", "sway.txt", "--save", "sway.rrd"],
+    ] {
+        let output = limited(line);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{line:?}: {said}");
+        assert!(said.contains("cannot be written (File too large"), "{said}");
+        assert!(!said.contains(".mimic-"), "{said}");
+        assert_eq!(leftovers(&bench), Vec::<String>::new());
+    }
+    let entries = fs::read_dir(bench.path(".")).expect("a folder");
+    assert_eq!(entries.count(), 1, "the clip alone");
+}
+
 /// What a killed process left is gone after the next write into its folder.
 #[cfg(target_os = "linux")]
 #[test]

@@ -9,42 +9,53 @@ mod tests;
 mod world;
 
 use crate::output::recording_id;
-use crate::recording::content::{Recording, Sink};
+use crate::recording::content::Recording;
 use names::{APPLICATION, TIMELINE};
 use rerun::external::re_log_types::StoreId;
 use rerun::{
     RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreKind, TimeColumn,
 };
+use std::error::Error;
 use std::time::Duration;
 
 /// How long a viewer may take to receive a whole recording; on one machine that is well below a second.
 const FLUSH: Duration = Duration::from_secs(30);
 
-/// Writes the whole recording and waits until it has arrived.
+/// The bytes of a file with the recording, whose id says what made it. They are collected in memory, where all of the
+/// recording is already: the library's own files wait for ever on a disk that is full.
 ///
 /// # Errors
-/// A file that cannot be written, or a viewer that goes away.
-pub fn write(shown: &Recording, sink: &Sink) -> Result<(), Box<dyn std::error::Error>> {
-    // The user asked for a recording, so it is written even where the variable RERUN turns the SDK off.
-    let mut builder = RecordingStreamBuilder::new(APPLICATION)
-        .recording_name(&shown.name)
-        .enabled(true);
-    if let Sink::File {
-        made: Some(made), ..
-    } = sink
-    {
+/// Data that the library doesn't take.
+pub fn bytes(shown: &Recording, made: Option<&str>) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut builder = builder(shown);
+    if let Some(made) = made {
         // Two recordings of one id would be one to the viewer, so its end is random. Who sets an id is taken for one of
         // several writers, and has to say that it sends the name.
         let random = StoreId::random(StoreKind::Recording, APPLICATION);
         let id = format!("{}{}", recording_id(made), random.recording_id());
         builder = builder.recording_id(id).send_properties(true);
     }
-    let stream = match sink {
-        Sink::File { path, .. } => builder.save(path)?,
-        Sink::Viewer(address) => builder.connect_grpc_opts(address)?,
-    };
+    let (stream, storage) = builder.memory()?;
+    log(&stream, shown)?;
+    Ok(storage.drain_as_bytes()?)
+}
+
+/// Sends the whole recording to the viewer at `address`, such as `rerun+http://127.0.0.1:9876/proxy`, and waits until it has
+/// arrived.
+///
+/// # Errors
+/// A viewer that goes away.
+pub fn send(shown: &Recording, address: &str) -> Result<(), Box<dyn Error>> {
+    let stream = builder(shown).connect_grpc_opts(address)?;
     log(&stream, shown)?;
     Ok(stream.flush_with_timeout(FLUSH)?)
+}
+
+/// The user asked for a recording, so it is made even where the variable RERUN turns the library off.
+fn builder(shown: &Recording) -> RecordingStreamBuilder {
+    RecordingStreamBuilder::new(APPLICATION)
+        .recording_name(&shown.name)
+        .enabled(true)
 }
 
 fn log(stream: &RecordingStream, shown: &Recording) -> RecordingStreamResult<()> {

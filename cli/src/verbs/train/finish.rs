@@ -9,6 +9,7 @@ use crate::runs;
 use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
+use mimic::explain::plain;
 use mimic::run::{CaseEvaluation, Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
 use serde::Serialize;
@@ -41,7 +42,7 @@ pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome
     if printer.is_json() {
         return last_line(run, stopped, CaseEvaluation::json(&results), printer);
     }
-    let folder = run.dir().display();
+    let folder = plain(&run.dir().display().to_string());
     let look = match recorded {
         Some(file) => how_to_look(run.dir(), &file),
         None => String::new(),
@@ -94,7 +95,8 @@ pub fn longest(session: &Session, samples_per_second: f64) -> Duration {
 
 /// What to do about a run that isn't learned, or not to its end.
 fn advice(session: &Session, stopped: Stopped, results: &[CaseEvaluation]) -> Option<String> {
-    let (mimic, folder) = (program(), session.run().dir().display());
+    let folder = plain(&session.run().dir().display().to_string());
+    let mimic = program();
     let (samples, planned) = (
         session.trainer().samples(),
         session.trainer().settings().samples,
@@ -158,7 +160,8 @@ fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
 }
 
 fn how_to_look(folder: &Path, recording: &Path) -> String {
-    let (folder, recording, mimic) = (folder.display(), recording.display(), program());
+    let shown = |path: &Path| plain(&path.display().to_string());
+    let (folder, recording, mimic) = (shown(folder), shown(recording), program());
     let mut text = format!(
         "recording: {recording}\n  watch it          rerun {recording}\n  or from the run   {mimic} replay {folder} --rerun\n"
     );
