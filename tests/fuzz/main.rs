@@ -10,6 +10,7 @@ mod json;
 mod ours;
 mod plain;
 mod random;
+mod runs;
 mod seeds;
 mod targets;
 mod tensors;
@@ -90,7 +91,8 @@ impl Run {
             let mut kinds = wanted.iter().flat_map(|list| list.split(','));
             wanted.is_none() || kinds.any(|name| name == kind)
         };
-        let seeds = seeds::all();
+        let mut seeds = seeds::all();
+        seeds.extend(seeds::of_run(folder.path()));
         let bytes = |kind: &str| {
             seeds
                 .iter()

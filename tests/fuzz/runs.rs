@@ -3,6 +3,7 @@
 use super::targets::Outcome;
 use mimic::clip::Clip;
 use mimic::evaluate::perform;
+use mimic::explain::Explanation;
 use mimic::retarget::{self, retarget};
 use mimic::run::{Plan, Run, RunError, Session, files};
 use mimic::skeleton::Skeleton;
@@ -17,7 +18,7 @@ pub const KINDS: [(&str, &str); 4] = [
     ("metrics", files::METRICS),
 ];
 
-/// Makes a run that has learned a little, in the folder `RUN` of `folder`.
+/// Makes a run that has learned a little, in `folder`.
 pub fn make(folder: &Path, clip: &Clip) {
     let skeleton = Skeleton::load("humanoid").expect("it is built in");
     let motion = retarget(clip, &skeleton, &retarget::Options::default());
@@ -77,8 +78,8 @@ fn act(run: &Run) -> Result<(), RunError> {
 
 /// Reads a plan, as of `--preset FILE`.
 pub fn plan(bytes: &[u8]) -> Outcome {
-    // The command line names the file.
-    let named = |error: String| format!("`plan.json`: {error}");
+    // As the command line does, which knows the file.
+    let named = |cause: String| Explanation::input(cause).file("plan.json").to_string();
     let plan: Plan = serde_json::from_slice(bytes).map_err(|e| named(e.to_string()))?;
     plan.check().map_err(|e| named(e.to_string()))?;
     // What is allowed can be written and read again.

@@ -5,7 +5,7 @@ use super::glb::Glb;
 use super::random::Random;
 use super::tensors::Tensors;
 use super::text::Text;
-use super::{json, ours, plain};
+use super::{json, ours, plain, runs};
 use mimic_test_support::foreign;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -79,7 +79,7 @@ const THEIRS: [(&str, &str); 47] = [
 ];
 
 /// Kinds that are texts, which may take less memory.
-const TEXTS: [&str; 9] = [
+const TEXTS: [&str; 12] = [
     "AMC",
     "ASCII FBX",
     "ASF",
@@ -88,6 +88,9 @@ const TEXTS: [&str; 9] = [
     "MJCF",
     "glTF",
     "joint map",
+    "metrics",
+    "plan",
+    "run",
     "slots",
 ];
 
@@ -136,6 +139,17 @@ pub fn all() -> Vec<Seed> {
     imported.chain(made).collect()
 }
 
+/// The files of a run that is made in `folder`, and the plans of all presets.
+pub fn of_run(folder: &Path) -> Vec<Seed> {
+    runs::make(folder, &ours::clip());
+    let files = runs::KINDS.map(|(kind, file)| (kind, file, runs::whole(folder, file)));
+    let plans = runs::plans().into_iter();
+    let plans = plans.map(|(name, bytes)| ("plan", name, bytes));
+    let made = files.into_iter().chain(plans);
+    let seeds = made.filter_map(|(kind, name, bytes)| seed(kind, Path::new(name), bytes));
+    seeds.collect()
+}
+
 fn seed(kind: &'static str, path: &Path, mut bytes: Vec<u8>) -> Option<Seed> {
     if kind == "AMC" {
         let end = bytes.iter().take(AMC_BYTES).rposition(|&b| b == b'\n');
@@ -165,10 +179,10 @@ fn form(kind: &str, bytes: &[u8]) -> Option<Form> {
     Some(match kind {
         "FBX" | "old FBX" => Form::Fbx(Fbx::parse(bytes)?),
         "GLB" | "VRM" => Form::Glb(Glb::parse(bytes)?),
-        "glTF" | "DeepMimic" | "joint map" | "slots" => {
+        "glTF" | "DeepMimic" | "joint map" | "plan" | "run" | "slots" => {
             Form::Json(serde_json::from_slice(bytes).ok()?)
         }
-        "clip" | "motion" => Form::Tensors(Tensors::parse(bytes)?),
+        "clip" | "motion" | "policy" | "checkpoint" => Form::Tensors(Tensors::parse(bytes)?),
         "MJCF" => Form::Text(Text::xml(bytes)),
         _ => Form::Text(Text::new(bytes)),
     })

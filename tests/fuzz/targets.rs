@@ -1,5 +1,6 @@
 //! What reads the files of each kind. A new kind gets its seeds in `ours.rs`, its form in `seeds.rs`, and an arm in [`read`].
 
+use super::runs;
 use mimic::clip::{Clip, Joint};
 use mimic::explain::Explain;
 use mimic::humanoid::HumanoidMap;
@@ -30,6 +31,8 @@ pub fn read(kind: &str, name: &str, bytes: &[u8], with: &With) -> Outcome {
             Some(bytes),
             with.folder,
         ),
+        "plan" => runs::plan(bytes),
+        "run" | "policy" | "checkpoint" | "metrics" => runs::read(kind, bytes, with.folder),
         "joint map" => map(&String::from_utf8_lossy(bytes), with.joints),
         "clip" => told(Clip::load(put(with.folder, "a.clip", bytes)), clip),
         "motion" => told(Motion::load(put(with.folder, "a.motion", bytes)), motion),
