@@ -60,6 +60,14 @@ impl Clock {
         Some(self.limit?.saturating_sub(self.begun.elapsed()))
     }
 
+    /// Share of the time that is over, from 0 to 1; 0 without a limit.
+    pub fn share(&self) -> f64 {
+        let limit = self
+            .limit
+            .map_or(f64::INFINITY, |limit| limit.as_secs_f64());
+        (self.begun.elapsed().as_secs_f64() / limit).min(1.0)
+    }
+
     /// The next iteration or round is taken to last as long as the one before.
     fn is_over_after(&self, time: Duration) -> bool {
         let then = self.begun.elapsed().saturating_add(time);
@@ -117,5 +125,8 @@ mod tests {
         let left = clock(Some(60)).left();
         assert!(left.is_some_and(|left| (49..=50).contains(&left.as_secs())));
         assert_eq!(clock(None).left(), None);
+        assert_eq!((clock(Some(5)).share(), clock(None).share()), (1.0, 0.0));
+        let half = clock(Some(20)).share();
+        assert!((0.5..0.6).contains(&half), "{half}");
     }
 }

@@ -47,14 +47,16 @@ impl Progress {
         let samples = iteration.metrics.samples;
         let left = self.left(samples, clock);
         let message = message(iteration, left);
-        self.bar.set_position(samples);
+        let share = samples as f64 / self.planned.max(1) as f64;
+        let share = share.max(clock.share()).min(1.0);
+        self.bar.set_position((share * self.planned as f64) as u64);
         if printer.is_json() {
             let mut line = json!(iteration);
             line["run"] = json!(self.folder);
             printer.json_line(&line)?;
         } else if self.bar.is_hidden() {
-            let percent = 100.0 * samples as f64 / self.planned.max(1) as f64;
-            let line = format!("{:>3.0} %  {message}", percent.min(100.0).floor());
+            let percent = (100.0 * share).floor();
+            let line = format!("training: {percent} %  {message}");
             match self.pace.borrow_mut().is_due() {
                 true => printer.say(line),
                 false => printer.detail(line),
