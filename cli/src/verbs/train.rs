@@ -292,7 +292,7 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
         if ends {
             progress.say("finishing this round");
         }
-        let ending = finish::longest(session, iteration.samples_per_second);
+        let ending = finish::duration(session, &iteration);
         let is_over = clock.end_iteration(ending);
         if !session.can_be_saved() {
             if is_over {

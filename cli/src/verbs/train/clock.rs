@@ -46,13 +46,13 @@ impl Clock {
     /// Ends an iteration. Returns whether there is no time for another one and then for the `ending` of the session.
     pub fn end_iteration(&mut self, ending: Duration) -> bool {
         self.iteration.end();
-        self.is_over_after(self.iteration.took.saturating_add(ending))
+        self.is_over_after(self.iteration.took, ending)
     }
 
     /// The same for a round, of which the iteration has been ended.
     pub fn end_round(&mut self, ending: Duration) -> bool {
         self.round.end();
-        self.is_over_after(self.round.took.saturating_add(ending))
+        self.is_over_after(self.round.took, ending)
     }
 
     /// Time to the limit, if there is one.
@@ -68,10 +68,14 @@ impl Clock {
         (self.begun.elapsed().as_secs_f64() / limit).min(1.0)
     }
 
-    /// The next iteration or round is taken to last as long as the one before.
-    fn is_over_after(&self, time: Duration) -> bool {
-        let then = self.begun.elapsed().saturating_add(time);
-        self.limit.is_some_and(|limit| then > limit)
+    /// The next iteration or round is taken to last as long as the one before. Of the time, at most a quarter is kept for the
+    /// ending: how long it takes is a guess, and something should be learned.
+    fn is_over_after(&self, next: Duration, ending: Duration) -> bool {
+        let Some(limit) = self.limit else {
+            return false;
+        };
+        let ending = ending.min(limit / 4);
+        self.begun.elapsed() + next + ending > limit
     }
 }
 
@@ -108,10 +112,12 @@ mod tests {
         for (limit, ending, [iteration, round]) in [
             (11, 0, [true, true]),
             (12, 0, [false, true]),
-            (13, 3, [true, true]),
+            (12, 1000, [true, true]),
             (16, 0, [false, false]),
             (16, 2, [false, true]),
             (19, 3, [false, false]),
+            (40, 1000, [false, false]),
+            (16, 1000, [false, true]),
         ] {
             let mut clock = clock(Some(limit));
             assert_eq!(clock.end_iteration(seconds(ending)), iteration, "{limit}");

@@ -10,7 +10,7 @@ use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
 use mimic::explain::plain;
-use mimic::run::{CaseEvaluation, Run, Session, files};
+use mimic::run::{CaseEvaluation, Iteration, Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -73,9 +73,9 @@ fn options(run: &Run) -> Options {
     }
 }
 
-/// How long [`finish`] takes at most, for a session that learns `samples_per_second`. An evaluation takes the steps of all its
-/// episodes; learning takes the same steps and an update, so the evaluation is faster.
-pub fn longest(session: &Session, samples_per_second: f64) -> Duration {
+/// How long [`finish`] takes, by what an `iteration` took: learning takes as many steps and an update, so an evaluation is
+/// faster. Its agent acts without noise and may last longer than in training; twice as long is reckoned with.
+pub fn duration(session: &Session, iteration: &Iteration) -> Duration {
     let options = options(session.run());
     let again = if options.perturbations.is_some() {
         2
@@ -85,12 +85,17 @@ pub fn longest(session: &Session, samples_per_second: f64) -> Duration {
     // One episode more starts from rest.
     let episodes = (again * options.episodes + 1) as f64;
     let task = session.trainer().task();
-    let lengths = task.cases().iter();
-    let seconds: f64 = lengths
-        .map(|case| case.duration_s.unwrap_or(options.seconds))
-        .sum();
+    let lasts = iteration
+        .metrics
+        .episode_length
+        .map_or(f64::INFINITY, |s| 2.0 * s);
+    let whole = task
+        .cases()
+        .iter()
+        .map(|case| case.duration_s.unwrap_or(options.seconds));
+    let seconds: f64 = whole.map(|seconds| seconds.min(lasts)).sum();
     let steps = episodes * seconds * task.control_hz();
-    Duration::try_from_secs_f64(steps / samples_per_second).unwrap_or(Duration::MAX)
+    Duration::try_from_secs_f64(steps / iteration.samples_per_second).unwrap_or(Duration::MAX)
 }
 
 /// What to do about a run that isn't learned, or not to its end.
