@@ -156,7 +156,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// Frames per second, up to what a clip may have.
-pub fn frame_rate(text: &str) -> Result<f64, String> {
+fn frame_rate(text: &str) -> Result<f64, String> {
     match positive(text)? {
         rate if rate <= MOST_FPS => Ok(rate),
         _ => Err(format!("must be at most {MOST_FPS}")),

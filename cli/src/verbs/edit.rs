@@ -1,6 +1,6 @@
 //! `mimic edit`: makes one clip of others.
 
-use crate::args::{Replace, frame_rate, positive, span};
+use crate::args::{Replace, positive, span};
 use crate::clip_report::ClipReport;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
@@ -83,7 +83,7 @@ struct Edits {
     #[arg(long, value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
     travel: Option<(f64, f64)>,
     /// Frames per second to resample to
-    #[arg(long, value_name = "HZ", value_parser = frame_rate, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     fps: Option<f64>,
 }
 
