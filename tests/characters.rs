@@ -255,6 +255,20 @@ fn what_a_character_has_is_counted_before_it_is_parsed() {
         (with(&format!("<site{attributes}/>")), "attributes"),
         (with(&"<body>".repeat(3000)), "nested"),
         (
+            ARM.replace(
+                "<option",
+                &format!("{}<option", "<default class=\"a\">".repeat(30)),
+            ),
+            "classes are nested",
+        ),
+        (
+            ARM.replace(
+                "<option",
+                &format!("<default>{}</default><option", "<default/>".repeat(3000)),
+            ),
+            "default classes",
+        ),
+        (
             with(&format!("<site name=\"{}\"/>", "x".repeat(10_000))),
             "longer than",
         ),

@@ -14,8 +14,9 @@ use std::time::{Duration, Instant};
 use ufbx::{AllocatorOpts, ElementType, LoadOpts, OpenFileCb, ProgressCb, ProgressResult};
 
 /// Bytes that ufbx may allocate for any file, and how many more per byte of the file: once for what it keeps, and once for what
-/// it needs while reading. Chosen: a text may take less. It uses Rust's allocator.
+/// it needs while reading; of a text, fewer per letter and more for any. Chosen. It uses Rust's allocator.
 const FREE_BYTES: usize = 8 << 20;
+const FREE_OF_TEXT: usize = 24 << 20;
 const BYTES_PER_BYTE: usize = 31;
 const BYTES_PER_LETTER: usize = 7;
 /// Longest time that reading may take for any file and for each MiB of it, and after how many bytes the clock is checked.
@@ -76,15 +77,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<UfbxScene, FbxError> {
 
 /// Reads the bytes, and no other file.
 fn load(bytes: &[u8]) -> Result<ufbx::SceneRoot, FbxError> {
-    let per_byte = match super::is_ascii(bytes) {
-        true => BYTES_PER_LETTER,
-        false => BYTES_PER_BYTE,
+    let (per_byte, free) = match super::is_ascii(bytes) {
+        true => (BYTES_PER_LETTER, FREE_OF_TEXT),
+        false => (BYTES_PER_BYTE, FREE_BYTES),
     };
     let limit = || AllocatorOpts {
-        memory_limit: bytes
-            .len()
-            .saturating_mul(per_byte)
-            .saturating_add(FREE_BYTES),
+        memory_limit: bytes.len().saturating_mul(per_byte).saturating_add(free),
         ..AllocatorOpts::default()
     };
     let start = Instant::now();

@@ -13,6 +13,8 @@ pub(crate) const MOST_BYTES: u64 = 1 << 20;
 /// Deepest nesting of elements that is let through. Chosen: the parser recurses once per level, a thread's usual stack
 /// holds 100 levels, and no character comes near that depth.
 const MAX_DEPTH: usize = 100;
+/// Deepest nesting of default classes: every element goes through those above its own. Chosen: models have up to five.
+const MAX_CLASSES: usize = 16;
 /// Most elements. Chosen: ten times as many as the largest humanoids have.
 const MAX_ELEMENTS: usize = 20_000;
 /// Most attributes of an element. The parser compares each with each. MuJoCo's elements have up to some fifty.
@@ -23,7 +25,8 @@ const MAX_WORD: usize = 500;
 
 /// What a character has at most of each kind, by the element that they stand in. Chosen: a human body with all fingers has
 /// some 160 degrees of freedom, and the memory of retargeting grows with the square of their number.
-const MAX_PARTS: [Parts; 5] = [
+const MAX_PARTS: [Parts; 6] = [
+    Parts::new("default", "", 1000, "default classes"),
     Parts::new("body", "", 256, "bodies"),
     Parts::new("joint", "body", 256, "joints"),
     Parts::new("freejoint", "body", 256, "free joints"),
@@ -132,8 +135,15 @@ impl<'a> Guard<'a> {
 
     fn open(&mut self, tag: Tag<'a>) -> Result<(), Defect> {
         self.count(tag)?;
-        let is_default = self.open.iter().any(|open| open.name == "default");
-        check_tag(tag, is_default)?;
+        let classes = self.open.iter().filter(|open| open.name == "default");
+        let classes = classes.count();
+        if classes > MAX_CLASSES {
+            return Err(Defect::new(
+                format!("default classes are nested more than {MAX_CLASSES} deep"),
+                "remove levels of classes",
+            ));
+        }
+        check_tag(tag, classes > 0)?;
         if !tag.is_empty {
             self.open.push(tag);
         }
