@@ -7,6 +7,7 @@ use super::plan::Plan;
 use crate::file::{LOCK, Lock, is_temporary};
 use crate::motion::Motion;
 use crate::skeleton::Skeleton;
+use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -37,7 +38,10 @@ impl Claim {
             lock: Some(Lock::take(dir).map_err(|e| RunError::locked(dir, e))?),
         };
         match check_empty(dir) {
-            Ok(()) => Ok(claim),
+            Ok(()) => {
+                remove(dir, |name| name != LOCK && files::is_own(name));
+                Ok(claim)
+            }
             Err(error) => {
                 claim.give_up();
                 Err(error)
@@ -147,33 +151,43 @@ fn unmade(dir: &Path, source: io::Error) -> RunError {
     }
 }
 
+/// Checks that nothing is in a folder but what a process left that was killed while it made a run there: the lock says that
+/// it had the folder for itself, and without a configuration it isn't a run yet.
 fn check_empty(dir: &Path) -> Result<(), RunError> {
     let entries = fs::read_dir(dir).map_err(|source| RunError::Read {
         path: dir.to_owned(),
         source,
     })?;
-    let others = entries.flatten().any(|entry| {
-        entry.file_name() != LOCK && !is_temporary(&entry.file_name().to_string_lossy())
-    });
-    match others {
-        false => Ok(()),
-        true if dir.join(files::CONFIG).exists() => Err(RunError::Exists(dir.to_owned())),
-        true => Err(RunError::NotEmpty(dir.to_owned())),
+    let was_claimed = dir.join(LOCK).exists();
+    let is_left = |name: &OsStr| {
+        name == LOCK
+            || is_temporary(&name.to_string_lossy())
+            || was_claimed && files::is_made_first(name)
+    };
+    let mut names = entries.flatten().map(|entry| entry.file_name());
+    match names.all(|name| is_left(&name)) {
+        true => Ok(()),
+        false if dir.join(files::CONFIG).exists() => Err(RunError::Exists(dir.to_owned())),
+        false => Err(RunError::NotEmpty(dir.to_owned())),
     }
 }
 
 /// Removes what a run wrote into the folder, and then the folders that were `made`. Files of others stay, and so do folders
 /// with something in them.
 fn clear(dir: &Path, lock: Lock, made: &[PathBuf]) {
-    // What can't be removed stays; the error that led here is told, and says more.
-    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
-        if files::is_own(&entry.file_name()) {
-            fs::remove_file(entry.path()).ok();
-        }
-    }
+    remove(dir, files::is_own);
     drop(lock);
     for folder in made {
         fs::remove_dir(folder).ok();
+    }
+}
+
+/// Removes files of a run, by their names. What can't be removed stays: what goes on here meets it, and says more.
+fn remove(dir: &Path, meant: impl Fn(&OsStr) -> bool) {
+    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+        if meant(&entry.file_name()) {
+            fs::remove_file(entry.path()).ok();
+        }
     }
 }
 
@@ -212,6 +226,27 @@ mod tests {
         Run::discard(folder.path().join("missing"));
         assert_eq!(fs::read_to_string(&file).expect("read"), "mine");
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_of_a_run_gives_way() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str| fs::write(folder.path().join(name), "left").expect("written");
+        for name in [files::SKELETON, files::SLOTS, "reference-3.motion"] {
+            write(name);
+        }
+        // Without the lock they may be anybody's.
+        let claim = || Claim::on(folder.path());
+        assert!(matches!(claim(), Err(RunError::NotEmpty(_))));
+        write(LOCK);
+        let claimed = claim().expect("nobody holds it");
+        let left = fs::read_dir(folder.path()).expect("listed").count();
+        assert_eq!(left, 1, "the lock alone");
+        drop(claimed);
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 0);
+        write(LOCK);
+        write("notes.txt");
+        assert!(matches!(claim(), Err(RunError::NotEmpty(_))));
     }
 
     #[test]

@@ -28,12 +28,18 @@ pub fn reference(index: usize) -> String {
 /// Whether a run writes files of this name.
 pub fn is_own(name: &OsStr) -> bool {
     let fixed = [
-        CONFIG, METRICS, CHECKPOINT, POLICY, EVALUATION, RECORDING, SKELETON, SLOTS, LOCK,
+        CONFIG, METRICS, CHECKPOINT, POLICY, EVALUATION, RECORDING, LOCK,
     ];
+    let is_fixed = fixed.iter().any(|own| name == *own);
+    is_fixed || is_made_first(name) || crate::file::is_temporary(&name.to_string_lossy())
+}
+
+/// Whether files of this name are made before the folder is a run.
+pub(super) fn is_made_first(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
-    let numbered = name
+    let number = name
         .strip_prefix("reference-")
         .and_then(|rest| rest.strip_suffix(".motion"));
-    let is_reference = numbered.is_some_and(|number| number.parse::<usize>().is_ok());
-    is_reference || fixed.contains(&&*name) || crate::file::is_temporary(&name)
+    let is_reference = number.is_some_and(|number| number.parse::<usize>().is_ok());
+    is_reference || [SKELETON, SLOTS].contains(&&*name)
 }
