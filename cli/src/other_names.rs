@@ -8,7 +8,7 @@ use std::ffi::OsString;
 
 /// Names that other programs have for flags, and what comes nearest here; of several, what the command has. No aliases: most
 /// take other values, so whoever types them has to know.
-const ELSEWHERE: [(&[&str], &[&str]); 18] = [
+const ELSEWHERE: [(&[&str], &[&str]); 19] = [
     (
         &[
             "steps",
@@ -56,6 +56,7 @@ const ELSEWHERE: [(&[&str], &[&str]); 18] = [
     (&["trials", "rollouts", "num-episodes"], &["episodes"]),
     (&["view", "watch", "open", "show"], &["rerun"]),
     (&["silent"], &["quiet"]),
+    (&["overwrite", "replace", "yes"], &["force"]),
 ];
 
 /// Flags of other programs that are settings here, beside those that have a setting's own name.

@@ -113,11 +113,18 @@ fn advice(session: &Session, stopped: Stopped, results: &[CaseEvaluation]) -> Op
             "train with more samples, by the same command with `--samples {}`",
             amount::count(planned.saturating_mul(2))
         )),
-        Stopped::Minutes | Stopped::Interrupt => Some(format!(
-            "stopped by `--minutes` after {} of {} samples, go on with `{mimic} train --resume {folder}`",
-            amount::count(samples),
-            amount::count(planned),
-        )),
+        Stopped::Minutes | Stopped::Interrupt => {
+            // A run goes on from where it was saved, which is between rounds.
+            let from = match session.can_be_saved() {
+                true => "",
+                false => ", which repeats the round that was cut short",
+            };
+            Some(format!(
+                "stopped by `--minutes` after {} of {} samples, go on with `{mimic} train --resume {folder}`{from}",
+                amount::count(samples),
+                amount::count(planned),
+            ))
+        }
     }
 }
 

@@ -36,6 +36,28 @@ fn a_run_that_is_stopped_goes_on_to_the_same_numbers() {
     assert_eq!(metrics(&bench, "cut"), metrics(&bench, "whole"));
 }
 
+/// The first round is longer than the time.
+#[test]
+fn a_run_that_was_cut_short_at_once_is_the_newest_all_the_same() {
+    let bench = with_preset();
+    bench.write(
+        "round.json",
+        br#"{ "environments": 8, "group": 4, "horizon": 16, "round": 50, "samples": 12800, "hidden": [16] }"#,
+    );
+    let line = ["train", "sway.txt", "--preset", "round.json"];
+    let output = bench
+        .mimic(&[&line[..], &["--minutes", "1e-9"]].concat())
+        .assert()
+        .success();
+    let text = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+    assert!(
+        text.contains("repeats the round that was cut short"),
+        "{text}"
+    );
+    assert!(!bench.path("runs/sway/checkpoint.safetensors").exists());
+    assert_eq!(bench.json(&["eval"]), bench.json(&["eval", "sway"]));
+}
+
 #[test]
 fn a_finished_run_is_finished_only_with_its_results() {
     let bench = with_run();
