@@ -221,6 +221,11 @@ const TABLES: &[Table] = &[
             ("most memory, MiB", "most_memory_mib"),
             ("memory asked, MiB", "asked.beyond_64_times_size_mib"),
             ("beyond 64 times the size, MiB", "beyond_64_times_size_mib"),
+            (
+                "memory asked of a text, MiB",
+                "asked.beyond_16_times_size_mib",
+            ),
+            ("beyond 16 times its size, MiB", "beyond_16_times_size_mib"),
         ],
     },
     Table {

@@ -180,11 +180,9 @@ pub fn run_time(run: &Path) -> Option<SystemTime> {
     files.iter().find_map(|file| modified(&run.join(file)))
 }
 
-/// The run in `runs/` that learned last. One that was never saved has nothing to show; one whose first round was cut short has
-/// a policy alone.
+/// The run in `runs/` that learned last. One that was never saved has nothing to show.
 pub fn newest_run() -> Option<PathBuf> {
-    let saved = [files::CHECKPOINT, files::POLICY];
-    let learned = |path: &PathBuf| saved.iter().find_map(|file| modified(&path.join(file)));
+    let learned = |path: &PathBuf| modified(&path.join(files::CHECKPOINT));
     let runs = entries(Path::new(RUNS)).filter(|path| is_run(path));
     let runs = runs.filter_map(|path| Some((learned(&path)?, path)));
     runs.max().map(|(_, path)| path)

@@ -41,8 +41,9 @@ pub fn evaluate(run: &Run, options: &Options, printer: &Printer) -> Outcome<Vec<
         .map(|m| format!("`{}`", m.name))
         .collect();
     printer.note(format!(
-        "evaluating {} from {} phases",
+        "evaluating {} in `{}` from {} phases",
         names.join(", "),
+        run.dir().display(),
         options.episodes
     ));
     let what = format!("evaluating {}", names.join(", "));

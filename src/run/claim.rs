@@ -108,13 +108,12 @@ impl Run {
         Claim::on(dir)?.create(plan, skeleton, motions)
     }
 
-    /// Removes the run in `dir` if it never was saved: there is nothing in it to go on from. A run with a checkpoint or a policy
-    /// stays, and so does one that another process trains.
+    /// Removes the run in `dir` if it never was saved: there is nothing in it to go on from. A run with a checkpoint stays,
+    /// and so does one that another process trains.
     pub fn discard(dir: impl AsRef<Path>) {
         let dir = dir.as_ref();
         let is_there = |name| dir.join(name).exists();
-        let saved = || is_there(files::CHECKPOINT) || is_there(files::POLICY);
-        let unsaved = || is_there(files::CONFIG) && !saved();
+        let unsaved = || is_there(files::CONFIG) && !is_there(files::CHECKPOINT);
         if !unsaved() {
             return;
         }

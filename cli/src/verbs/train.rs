@@ -290,7 +290,7 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
         }
         let ends = stop.is_wanted() || unheard.is_some();
         if ends {
-            progress.say("finishing this round");
+            progress.stopping();
         }
         let ending = finish::duration(session, &iteration);
         let is_over = clock.end_iteration(ending);
@@ -304,11 +304,12 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
             continue;
         }
         session.save().map_err(|e| unwritten(session.run(), e))?;
+        // Who went away, but at the end, misses the lines alone: the run is finished as any other.
+        if session.is_done() && !stop.is_wanted() {
+            break Stopped::Samples;
+        }
         if ends {
             break Stopped::Interrupt;
-        }
-        if session.is_done() {
-            break Stopped::Samples;
         }
         if clock.end_round(ending) {
             break Stopped::Minutes;
@@ -319,7 +320,7 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
     } else {
         end
     };
-    match unheard {
+    match unheard.filter(|_| end != Stopped::Samples) {
         Some(failure) => {
             drop(progress);
             printer.say(farewell(session.run()));

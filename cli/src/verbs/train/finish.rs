@@ -10,7 +10,7 @@ use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
 use mimic::explain::plain;
-use mimic::run::{CaseEvaluation, Iteration, Run, Session, files};
+use mimic::run::{CaseEvaluation, Iteration, Plan, Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -110,14 +110,16 @@ fn advice(session: &Session, stopped: Stopped, results: &[CaseEvaluation]) -> Op
     match stopped {
         Stopped::Samples if learned => None,
         Stopped::Samples => Some(format!(
-            "train with more samples, by the same command with `--samples {}`",
-            amount::count(planned.saturating_mul(2))
+            "train a new run with more samples, by the same command with `--samples {}`",
+            amount::count(planned.saturating_mul(2).max(Plan::default().samples))
         )),
         Stopped::Minutes | Stopped::Interrupt => {
-            // A run goes on from where it was saved, which is between rounds.
             let from = match session.can_be_saved() {
-                true => "",
-                false => ", which repeats the round that was cut short",
+                true => String::new(),
+                false => format!(
+                    ", which repeats the round that was cut short, from {} samples on",
+                    amount::count(saved(session))
+                ),
             };
             Some(format!(
                 "stopped by `--minutes` after {} of {} samples, go on with `{mimic} train --resume {folder}`{from}",
@@ -126,6 +128,14 @@ fn advice(session: &Session, stopped: Stopped, results: &[CaseEvaluation]) -> Op
             ))
         }
     }
+}
+
+/// The samples of the last checkpoint: a run goes on from where it was saved, which is between rounds.
+fn saved(session: &Session) -> u64 {
+    let settings = session.trainer().settings();
+    let each = (settings.environments * settings.horizon) as u64;
+    let iteration = session.trainer().iteration();
+    (iteration - iteration % settings.round.max(1)) * each
 }
 
 /// For a run that has used up its samples: does what a session that was killed left out, and makes a policy that was lost or

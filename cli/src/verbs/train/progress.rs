@@ -8,7 +8,7 @@ use crate::progress::Pace;
 use indicatif::ProgressBar;
 use mimic::run::{Iteration, Session};
 use serde_json::json;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::time::Instant;
 
 /// A progress bar, or lines where nobody sees a bar.
@@ -17,6 +17,8 @@ pub struct Progress {
     pace: RefCell<Pace>,
     folder: String,
     begun: Instant,
+    /// Whether training was asked to stop, which is then all that the bar says.
+    is_stopping: Cell<bool>,
     /// Samples at the start, and those of the plan.
     first: u64,
     planned: u64,
@@ -37,6 +39,7 @@ impl Progress {
             pace: RefCell::new(Pace::new()),
             folder: session.run().dir().display().to_string(),
             begun: Instant::now(),
+            is_stopping: Cell::new(false),
             first,
             planned,
         }
@@ -62,7 +65,9 @@ impl Progress {
                 false => printer.detail(line),
             }
         }
-        self.bar.set_message(message);
+        if !self.is_stopping.get() {
+            self.bar.set_message(message);
+        }
         Ok(())
     }
 
@@ -75,8 +80,10 @@ impl Progress {
         limit.map_or(rest, |limit| limit.as_secs_f64().min(rest))
     }
 
-    /// Says what is going on.
-    pub fn say(&self, text: &'static str) {
+    /// Says that training was asked to stop, and for what it doesn't yet.
+    pub fn stopping(&self) {
+        self.is_stopping.set(true);
+        let text = "finishing this round, then saving; Ctrl-C again loses the round";
         self.bar.set_message(text);
     }
 
