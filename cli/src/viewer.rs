@@ -7,11 +7,13 @@ pub use place::Bind;
 use crate::failure::{Failure, Outcome};
 use place::answers;
 use std::fmt::Display;
+use std::io::Read;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 /// Version of the recordings that we write. A viewer reads recordings of its own version best.
@@ -248,10 +250,24 @@ pub fn install() -> String {
     )
 }
 
+/// How long `rerun --version` may take, and most bytes of what it says. Its Python package takes a second or two.
+const PATIENCE: Duration = Duration::from_secs(20);
+const MOST_SAID: u64 = 4096;
+
 /// From the first line of `rerun --version`, e.g. `rerun-cli 0.36.3 (…)`.
 fn stated_version(path: &Path) -> Option<String> {
-    let output = Command::new(path).arg("--version").output().ok()?;
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let mut program = Command::new(path);
+    program.arg("--version").stdin(Stdio::null());
+    program.stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = program.spawn().ok()?;
+    let said = child.stdout.take()?.take(MOST_SAID);
+    // Whatever has this name may say nothing for ever, or talk without end.
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || sender.send(std::io::read_to_string(said).unwrap_or_default()));
+    let text = receiver.recv_timeout(PATIENCE).ok();
+    child.kill().ok();
+    child.wait().ok();
+    let text = text?;
     let mut words = text.split_whitespace();
     words
         .find(|word| word.starts_with(|c: char| c.is_ascii_digit()))

@@ -1,6 +1,6 @@
 //! A lock on a folder that one process at a time may change.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -87,12 +87,26 @@ impl Lock {
 
 /// Opens the file that is locked. It is written, so it may not lead to another one.
 fn open(path: &Path) -> io::Result<File> {
-    if path.symlink_metadata().is_ok_and(|found| !found.is_file()) {
-        return Err(io::Error::other(format!("{LOCK} is not a regular file")));
+    let found = path.symlink_metadata().ok();
+    if found.is_some_and(|found| !found.is_file() || has_other_names(&found)) {
+        let cause = format!("{LOCK} is not a file of this folder alone");
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, cause));
     }
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
     options.open(path)
+}
+
+/// Whether a file is another one's, too, which would be written with it.
+#[cfg(unix)]
+fn has_other_names(found: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    found.nlink() > 1
+}
+
+#[cfg(not(unix))]
+fn has_other_names(_: &Metadata) -> bool {
+    false
 }
 
 /// Whether the open file is still the one at `path`.
@@ -216,6 +230,9 @@ mod tests {
         let run = folder.path().join("run");
         std::fs::create_dir(&run).expect("a folder");
         std::os::unix::fs::symlink(&elsewhere, run.join(LOCK)).expect("a link");
+        assert!(matches!(Lock::take(&run), Err(LockError::System(_))));
+        std::fs::remove_file(run.join(LOCK)).expect("removed");
+        std::fs::hard_link(&elsewhere, run.join(LOCK)).expect("another name");
         assert!(matches!(Lock::take(&run), Err(LockError::System(_))));
         assert_eq!(Lock::holder(&run), None);
         assert_eq!(std::fs::read_to_string(&elsewhere).expect("read"), "kept");

@@ -26,7 +26,7 @@ use std::path::Path;
 
 /// Whether a file of this name is one that is being written, or was left by a process that was killed meanwhile.
 pub fn is_temporary(name: &str) -> bool {
-    name.starts_with(unfinished::PREFIX)
+    unfinished::writer_of(name).is_some()
 }
 
 /// Replaces the content of the file `path` by `bytes`, at once: they are written to a temporary file beside it, flushed to

@@ -141,7 +141,7 @@ fn is_left_behind(entry: &DirEntry) -> bool {
 }
 
 /// The process whose unfinished file has this name.
-fn writer_of(name: &str) -> Option<u32> {
+pub(super) fn writer_of(name: &str) -> Option<u32> {
     let (process, letters) = name.strip_prefix(PREFIX)?.split_once('-')?;
     let random = letters.len() == RANDOM && letters.chars().all(|c| c.is_ascii_alphanumeric());
     process.parse().ok().filter(|_| random)

@@ -20,6 +20,8 @@ pub struct Claim {
     made: Vec<PathBuf>,
     /// `None` once a run has taken it over.
     lock: Option<Lock>,
+    /// Whether files of a run were written. Before that, what is there is somebody's.
+    written: bool,
 }
 
 impl Claim {
@@ -36,12 +38,10 @@ impl Claim {
             dir: dir.to_owned(),
             made,
             lock: Some(Lock::take(dir).map_err(|e| RunError::locked(dir, e))?),
+            written: false,
         };
         match check_empty(dir) {
-            Ok(()) => {
-                remove(dir, |name| name != LOCK && files::is_own(name));
-                Ok(claim)
-            }
+            Ok(()) => Ok(claim),
             Err(error) => {
                 claim.give_up();
                 Err(error)
@@ -65,6 +65,9 @@ impl Claim {
         motions: Vec<Motion>,
     ) -> Result<Run, RunError> {
         check(&plan, &skeleton, &motions)?;
+        // What a killed process left gives way now that a run will take its place.
+        remove(&self.dir, |name| name != LOCK && files::is_own(name));
+        self.written = true;
         let write = |name: &str, text: &str| super::folder::write(&self.dir.join(name), text);
         write(files::SKELETON, &skeleton.mjcf)?;
         write(files::SLOTS, &skeleton.slots_json())?;
@@ -89,7 +92,10 @@ impl Claim {
 impl Drop for Claim {
     fn drop(&mut self) {
         if let Some(lock) = self.lock.take() {
-            clear(&self.dir, lock, &self.made);
+            let written = self.written;
+            clear(&self.dir, lock, &self.made, |name| {
+                name == LOCK || written && files::is_own(name)
+            });
         }
     }
 }
@@ -119,7 +125,7 @@ impl Run {
         }
         // Only under the lock is it sure that nobody saves.
         if let Some(lock) = Lock::take(dir).ok().filter(|_| unsaved()) {
-            clear(dir, lock, &[dir.to_owned()]);
+            clear(dir, lock, &[dir.to_owned()], files::is_own);
         }
     }
 }
@@ -172,10 +178,9 @@ fn check_empty(dir: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Removes what a run wrote into the folder, and then the folders that were `made`. Files of others stay, and so do folders
-/// with something in them.
-fn clear(dir: &Path, lock: Lock, made: &[PathBuf]) {
-    remove(dir, files::is_own);
+/// Removes the files in a folder that are `meant`, and then the folders that were `made`. Folders with something in them stay.
+fn clear(dir: &Path, lock: Lock, made: &[PathBuf], meant: impl Fn(&OsStr) -> bool) {
+    remove(dir, meant);
     drop(lock);
     for folder in made {
         fs::remove_dir(folder).ok();
@@ -239,11 +244,9 @@ mod tests {
         let claim = || Claim::on(folder.path());
         assert!(matches!(claim(), Err(RunError::NotEmpty(_))));
         write(LOCK);
-        let claimed = claim().expect("nobody holds it");
+        drop(claim().expect("nobody holds it"));
         let left = fs::read_dir(folder.path()).expect("listed").count();
-        assert_eq!(left, 1, "the lock alone");
-        drop(claimed);
-        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 0);
+        assert_eq!(left, 3, "no run took its place");
         write(LOCK);
         write("notes.txt");
         assert!(matches!(claim(), Err(RunError::NotEmpty(_))));

@@ -2,11 +2,12 @@
 
 use crate::evaluate::EvaluateError;
 use crate::explain::{Explain, Explanation, Fault, Parameter, explained};
-use crate::file::{FileError, Holder, LockError, unread};
+use crate::file::{FileError, Holder, LOCK, LockError, unread};
 use crate::learn::LearnError;
 use crate::motion::MotionError;
 use crate::skeleton::SkeletonError;
 use crate::task::TaskError;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Why a run can't be made, opened or go on.
@@ -17,14 +18,14 @@ pub enum RunError {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// A file of the run can't be written.
     Write {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// The folder of a new run holds a run already.
     Exists(PathBuf),
@@ -99,6 +100,14 @@ impl RunError {
         let path = path.to_owned();
         match error {
             LockError::Held(holder) => Self::Held { path, holder },
+            LockError::System(source) if source.kind() == io::ErrorKind::InvalidInput => {
+                let path = path.join(LOCK);
+                let reason = "this is not a file of this folder alone, which the lock has to be";
+                Self::Config {
+                    path,
+                    reason: reason.to_owned(),
+                }
+            }
             LockError::System(source) => Self::Write { path, source },
         }
     }

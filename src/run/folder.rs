@@ -158,7 +158,9 @@ impl Run {
         let task = build(&self.plan.task, &self.skeleton, &self.motions)?;
         let mut trainer = Trainer::new(self.plan.trainer(), task)?;
         let path = self.dir.join(files::CHECKPOINT);
-        if path.exists() {
+        if path.symlink_metadata().is_err() {
+            self.check_unlearned(&path)?;
+        } else {
             let checkpoint = Checkpoint::load(&path)?;
             self.check_progress(&checkpoint, &path)?;
             let Checkpoint {
@@ -177,6 +179,17 @@ impl Run {
             trainer.restore(state).map_err(RunError::in_file(&path))?;
         }
         Ok(trainer)
+    }
+
+    /// Checks that a run without a checkpoint hasn't learned anything yet. It would begin anew, and replace its policy.
+    fn check_unlearned(&self, checkpoint: &Path) -> Result<(), RunError> {
+        if !self.dir.join(files::POLICY).exists() {
+            return Ok(());
+        }
+        Err(RunError::Config {
+            path: checkpoint.to_owned(),
+            reason: "this is missing, and without it the policy can't learn on".to_owned(),
+        })
     }
 
     /// Checks that a checkpoint is one of this run: its samples are those of its iterations.
@@ -298,7 +311,8 @@ impl Run {
     /// Drops the metrics of iterations after the checkpoint, which will be done again.
     pub(super) fn trim_metrics(&self, iteration: u64) -> Result<(), RunError> {
         let path = self.dir.join(files::METRICS);
-        if !path.exists() {
+        // A link that leads nowhere is there: lines would be added where it leads.
+        if path.symlink_metadata().is_err() {
             return Ok(());
         }
         let known = |line: &&str| {

@@ -235,9 +235,15 @@ impl Axis {
     }
 
     fn ticks(&self) -> Vec<(f64, String)> {
-        let powers = (self.low.ceil() as i32..=self.high.floor() as i32).map(|p| 10f64.powi(p));
-        let powers: Vec<f64> = powers.collect();
-        if self.scale == Scale::Logarithmic && powers.len() >= 2 {
+        // The ends of a linear axis are no powers, and there is no end to how far apart they may be.
+        let powers: Vec<f64> = match self.scale {
+            Scale::Linear => Vec::new(),
+            Scale::Logarithmic => {
+                let powers = self.low.ceil() as i32..=self.high.floor() as i32;
+                powers.map(|p| 10f64.powi(p)).collect()
+            }
+        };
+        if powers.len() >= 2 {
             let every = powers.len().div_ceil(5);
             return powers
                 .into_iter()
@@ -251,13 +257,17 @@ impl Axis {
         };
         let step = tick_step(high - low, PANEL[1]);
         let first = (low / step).ceil();
-        (0..)
+        // Of numbers so large that the next step is the same number, the first marks say enough.
+        (0..MOST_MARKS)
             .map(|n| (first + f64::from(n)) * step + 0.0)
             .take_while(|value| *value <= high + 1e-9 * step)
             .map(|value| (value, mark(value, step)))
             .collect()
     }
 }
+
+/// Most marks of an axis, of which a step is chosen for a handful.
+const MOST_MARKS: u32 = 50;
 
 /// As [`number()`], with enough digits to differ from the next mark, a `step` away.
 fn mark(value: f64, step: f64) -> String {

@@ -25,6 +25,9 @@ runs can be compared by it.";
 /// Most phases that a line of the table lists.
 const MOST_PHASES: usize = 7;
 
+/// Shortest episode, seconds: whoever falls takes about as long.
+const LEAST_SECONDS: f64 = 1.0;
+
 /// Longest episode, seconds: every frame of every episode is held in memory until all are measured.
 const MOST_SECONDS: f64 = 3600.0;
 
@@ -55,7 +58,10 @@ pub struct Args {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    runs::at_most(text, MOST_SECONDS, "seconds")
+    match runs::at_most(text, MOST_SECONDS, "seconds")? {
+        long if long >= LEAST_SECONDS => Ok(long),
+        _ => Err(format!("must be at least {LEAST_SECONDS} s")),
+    }
 }
 
 impl Args {

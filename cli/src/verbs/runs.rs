@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use mimic::explain::plain;
-use mimic::file::Lock;
+use mimic::file::{Lock, text_at_most};
 use mimic::run::{Checkpoint, Run, files};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -159,10 +159,13 @@ fn read(folder: &Path, held: bool) -> Outcome<Entry> {
     })
 }
 
+/// Most bytes that are read of an evaluation. Chosen: a thousand motions have a tenth.
+const MOST_BYTES: u64 = 16 << 20;
+
 /// The run's evaluation, if it has one that can be read.
 fn evaluation(run: &Path) -> Option<Value> {
-    let text = std::fs::read(run.join(files::EVALUATION)).ok()?;
-    serde_json::from_slice(&text).ok()
+    let text = text_at_most(run.join(files::EVALUATION), MOST_BYTES).ok()?;
+    serde_json::from_str(&text).ok()
 }
 
 /// Survival over the motions of a run, as `mimic plot` shows it.
@@ -179,7 +182,9 @@ fn survival(evaluation: &Value) -> Option<f64> {
 fn logged(run: &Path) -> Option<u64> {
     /// Many times a line of the log.
     const END: u64 = 1 << 16;
-    let mut file = File::open(run.join(files::METRICS)).ok()?;
+    let path = run.join(files::METRICS);
+    // Opening a pipe waits for who writes into it.
+    let mut file = path.is_file().then(|| File::open(&path).ok()).flatten()?;
     let length = file.metadata().ok()?.len();
     file.seek(SeekFrom::Start(length.saturating_sub(END)))
         .ok()?;

@@ -1,5 +1,6 @@
 //! The `mimic` program as its users meet it.
 
+mod attacked;
 mod completions;
 mod disturbed;
 mod edit;

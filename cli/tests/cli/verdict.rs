@@ -35,7 +35,7 @@ fn training_ends_with_a_verdict_and_what_is_good() {
     // A swaying figure of a few dozen samples has learned nothing, and is told how to.
     assert!(verdict.starts_with("not yet learned: "), "{verdict}");
     assert!(
-        verdict.ends_with("by the same command with `--samples 64`"),
+        verdict.ends_with("by the same command with `--samples 4M`"),
         "{verdict}"
     );
     let table: Vec<&str> = said
