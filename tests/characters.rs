@@ -171,7 +171,7 @@ fn numbers_that_cannot_be_are_refused_where_they_stand() {
 }
 
 #[test]
-fn a_joint_that_nothing_drives_is_refused_with_its_body() {
+fn a_character_that_nothing_drives_is_refused_with_its_first_joint() {
     let start = ARM.find("  <actuator>").expect("it has actuators");
     let without = format!("{}</mujoco>", &ARM[..start]);
     let idle = [
@@ -191,6 +191,11 @@ fn a_joint_that_nothing_drives_is_refused_with_its_body() {
         assert!(said.contains("joint `elbow` of body `arm`"), "{said}");
         assert!(said.contains("<position>"), "{said}");
     }
+    // Single joints may swing freely.
+    let hand = r#"<body name="hand" pos="0 0.25 0"><joint name="wrist" axis="1 0 0"/>
+      <geom type="sphere" size="0.05" mass="0.4"/></body></body></body>"#;
+    let ends = "      </body>\n    </body>";
+    assert!(load(&spoiled(ends, hand)).is_ok());
     // Its own spring drives a joint as well, and the library can retarget to a character without motors.
     assert!(load(&without.replace("stiffness=\"0\"", "stiffness=\"50\"")).is_ok());
     assert!(Skeleton::from_mjcf("arm", &without, None).is_ok());

@@ -88,11 +88,11 @@ impl Explain for SimError {
                 .remedy("keep one character in the skeleton, with all its bodies under one root"),
             Self::Massless { body } => of_body(body, "it moves but has no mass")
                 .remedy("give the body a geom or an <inertial>"),
-            Self::Undriven { body, joint } => {
-                Explanation::input("nothing drives this joint, so no policy can move it")
-                    .place(format!("joint `{joint}` of body `{body}`"))
-                    .remedy("give it a <position> actuator")
-            }
+            Self::Undriven { body, joint } => Explanation::input(
+                "nothing drives this joint or any other, so no policy can move the character",
+            )
+            .place(format!("joint `{joint}` of body `{body}`"))
+            .remedy("give the joints <position> actuators"),
             Self::Empty => Explanation::input("the skeleton has no bodies")
                 .remedy("add a body with a free joint"),
         }

@@ -67,15 +67,19 @@ pub(super) fn drives(
 }
 
 impl Skeleton {
-    /// The first joint with a coordinate that nothing drives, and its body: no position actuator, no motor with a limit, and
-    /// no stiffness of its own. A policy can't move it.
+    /// The first joint of a character none of whose joints is driven, and its body: there is no position actuator, no motor
+    /// with a limit, and no stiffness of a joint. A policy can't move such a character. Single joints may swing freely.
     pub fn undriven(&self) -> Option<(&Body, &Joint)> {
-        let is_idle = |drive: &Drive| drive.kp == 0.0 || drive.force_limit == 0.0;
-        self.bodies.iter().find_map(|body| {
-            let mut joints = body.joints.iter();
-            let joint = joints.find(|joint| joint.drives.iter().any(is_idle))?;
-            Some((body, joint))
-        })
+        let is_driven = |drive: &Drive| drive.kp != 0.0 && drive.force_limit != 0.0;
+        let joints = || {
+            let bodies = self.bodies.iter();
+            bodies.flat_map(|body| body.joints.iter().map(move |joint| (body, joint)))
+        };
+        let mut drives = joints().flat_map(|(_, joint)| joint.drives.iter());
+        match drives.any(is_driven) {
+            true => None,
+            false => joints().find(|(_, joint)| !joint.drives.is_empty()),
+        }
     }
 
     /// The skeleton, if its joints have motors.
@@ -88,8 +92,8 @@ impl Skeleton {
         };
         let place = format!("joint `{}` of body `{}`", joint.name, body.name);
         let defect = Defect::new(
-            "no actuator drives it, and it has no stiffness of its own",
-            "add a <position> actuator for each of its axes, or a <motor> with a `ctrlrange`",
+            "no actuator drives it or any other joint, and none has stiffness of its own",
+            "add a <position> actuator for each axis of the joints, or a <motor> with a `ctrlrange`",
         );
         Err(SkeletonError::mjcf(&self.name, Some(place), defect))
     }
