@@ -1,6 +1,6 @@
 //! The learning curves of runs: a grid of panels, a colour per run.
 
-use super::svg::{escaped, svg, tick_step};
+use super::svg::{MOST_MARKS, escaped, svg, tick_step};
 use std::fmt::Write;
 
 const COLUMNS: usize = 3;
@@ -110,7 +110,7 @@ fn draw(body: &mut String, panel: &Panel, [left, top]: [f64; 2], most: f64) {
         text(body, [left - 6.0, y + 4.0], "tick", &label);
     }
     let step = tick_step(most, width / 2.0);
-    let ticks = (0..).map(|n| f64::from(n) * step);
+    let ticks = (0..MOST_MARKS).map(|n| f64::from(n) * step);
     for samples in ticks.take_while(|samples| *samples <= most * (1.0 + 1e-9)) {
         let x = left + width * samples / most;
         writeln!(
@@ -265,9 +265,6 @@ impl Axis {
             .collect()
     }
 }
-
-/// Most marks of an axis, of which a step is chosen for a handful.
-const MOST_MARKS: u32 = 50;
 
 /// As [`number()`], with enough digits to differ from the next mark, a `step` away.
 fn mark(value: f64, step: f64) -> String {

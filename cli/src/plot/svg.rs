@@ -5,6 +5,9 @@ use mimic::explain::plain;
 /// Least distance between tick marks, pixels: a line of text needs about half of it.
 const TICK_ROOM: f64 = 30.0;
 
+/// Most marks of an axis. A step is chosen for a handful of them, but very large numbers have no next one a step away.
+pub const MOST_MARKS: u32 = 50;
+
 /// The step between the tick marks of an axis that shows `range` on a length of `pixels`: 1, 2 or 5 times a power of ten.
 pub fn tick_step(range: f64, pixels: f64) -> f64 {
     let least = range * TICK_ROOM / pixels;

@@ -1,6 +1,6 @@
 //! The tracks of a motion: panels over time, one below the other.
 
-use super::svg::{escaped, short, svg, tick_step};
+use super::svg::{MOST_MARKS, escaped, short, svg, tick_step};
 use mimic::motion::Motion;
 use std::fmt::Write;
 
@@ -137,15 +137,15 @@ impl Sheet {
     /// Draws the grid lines from `low` to `high` at their `height`, with their values on the left.
     fn ticks(&mut self, low: f64, high: f64, height: impl Fn(f64) -> f64) {
         let step = tick_step(high - low, PANEL);
-        let mut tick = (low / step).ceil();
-        while tick * step <= high + 1e-9 * step {
+        let first = (low / step).ceil();
+        let ticks = (0..MOST_MARKS).map(|n| first + f64::from(n));
+        for tick in ticks.take_while(|tick| tick * step <= high + 1e-9 * step) {
             let (value, y) = (tick * step + 0.0, height(tick * step));
             self.draw(format!(
                 r#"<path class="grid" d="M{LEFT} {y:.1}H{:.1}"/>"#,
                 WIDTH - RIGHT
             ));
             self.text(LEFT - 8.0, y + 4.0, "tick", &short(value));
-            tick += 1.0;
         }
     }
 
@@ -196,19 +196,14 @@ impl Sheet {
     fn finish(mut self) -> String {
         let bottom = self.y - GAP;
         let step = tick_step(self.duration, 2.5 * PANEL);
-        let mut tick = 0.0;
-        while tick * step <= self.duration + 1e-9 {
-            let x = LEFT + tick * step / self.duration * (WIDTH - LEFT - RIGHT);
+        let ticks = (0..MOST_MARKS).map(|n| f64::from(n) * step);
+        let duration = self.duration;
+        for time in ticks.take_while(|time| *time <= duration + 1e-9) {
+            let x = LEFT + time / duration * (WIDTH - LEFT - RIGHT);
             self.draw(format!(
                 r#"<path class="grid" d="M{x:.1} {TOP}V{bottom:.1}"/>"#
             ));
-            self.text(
-                x,
-                bottom + 18.0,
-                "time",
-                &format!("{} s", short(tick * step)),
-            );
-            tick += 1.0;
+            self.text(x, bottom + 18.0, "time", &format!("{} s", short(time)));
         }
         svg(WIDTH, bottom + 34.0, &self.body)
     }

@@ -7,8 +7,16 @@ use serde_json::Value;
 #[test]
 fn a_drawing_of_any_numbers_ends() {
     let bench = Workbench::with_run();
-    for size in ["1e17", "1e308", "-1e300"] {
-        let line = format!("{{\"iteration\":1,\"samples\":1,\"normalized_return\":{size}}}\n");
+    let most = "1.7976931348623157e308";
+    for (samples, size) in [
+        ("1", "1e17"),
+        ("1", "1e308"),
+        ("1", "-1e300"),
+        (most, "1"),
+        (most, most),
+    ] {
+        let line =
+            format!("{{\"iteration\":1,\"samples\":{samples},\"normalized_return\":{size}}}\n");
         bench.write("runs/sway/metrics.jsonl", line.repeat(2).as_bytes());
         bench.write(
             "runs/sway/eval.json",
