@@ -288,8 +288,7 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
             // What is learned in this round is saved first, whatever became of standard output.
             unheard = progress.show(&iteration, &clock, printer).err();
         }
-        let ends = stop.is_wanted() || unheard.is_some();
-        if ends {
+        if stop.is_wanted() || unheard.is_some() {
             progress.stopping();
         }
         let ending = finish::duration(session, &iteration);
@@ -304,15 +303,11 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
             continue;
         }
         session.save().map_err(|e| unwritten(session.run(), e))?;
-        // Who went away, but at the end, misses the lines alone: the run is finished as any other.
-        if session.is_done() && !stop.is_wanted() {
-            break Stopped::Samples;
-        }
-        if ends {
-            break Stopped::Interrupt;
-        }
-        if clock.end_round(ending) {
-            break Stopped::Minutes;
+        // A signal may have come while that was saved, so it is asked for once more.
+        let ended = ended(session.is_done(), stop.is_wanted(), unheard.is_some());
+        let time_is_up = || clock.end_round(ending).then_some(Stopped::Minutes);
+        if let Some(end) = ended.or_else(time_is_up) {
+            break end;
         }
     };
     let end = if stop.release() {
@@ -330,6 +325,33 @@ fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<
     }
 }
 
+/// Whether training ends where it was just saved, and by what. Who went away, but at the end, misses the lines alone: the run is
+/// finished as any other.
+fn ended(is_done: bool, is_asked: bool, is_unheard: bool) -> Option<Stopped> {
+    match (is_asked, is_done, is_unheard) {
+        (true, _, _) => Some(Stopped::Interrupt),
+        (false, true, _) => Some(Stopped::Samples),
+        (false, false, true) => Some(Stopped::Interrupt),
+        (false, false, false) => None,
+    }
+}
+
 fn minutes(text: &str) -> Result<f64, String> {
     runs::at_most(text, MOST_MINUTES, "minutes")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run that is done never goes on, at whatever moment a signal comes.
+    #[test]
+    fn a_run_that_is_done_ends() {
+        for (asked, unheard) in [(false, false), (true, false), (false, true), (true, true)] {
+            let end = ended(true, asked, unheard).map(|end| end == Stopped::Interrupt);
+            assert_eq!(end, Some(asked), "{asked} {unheard}");
+        }
+        assert!(ended(false, false, false).is_none());
+        assert!(ended(false, false, true) == Some(Stopped::Interrupt));
+    }
 }
