@@ -86,7 +86,7 @@ pub struct Measure {
     pub label: &'static str,
     /// The unit of `value`.
     pub unit: Unit,
-    /// How much it is.
+    /// How much it is; not a number where it isn't defined, which is `null` in JSON.
     pub value: f64,
     /// Which values are good.
     pub good: Good,

@@ -212,12 +212,13 @@ fn table(result: &CaseEvaluation) -> String {
     rows.iter().enumerate().map(line).collect()
 }
 
-/// Which values of a measure are good.
+/// Which values of a measure are good, and whether it misses them.
 fn good(measure: &Measure) -> String {
     let enough = measure.enough.map(|enough| value(measure, enough));
+    let missed = if measure.is_enough() { "" } else { "  missed" };
     match (measure.good, enough) {
-        (Good::High, Some(enough)) => format!("{enough} or more"),
-        (Good::Low, Some(enough)) => format!("{enough} or less"),
+        (Good::High, Some(enough)) => format!("{enough} or more{missed}"),
+        (Good::Low, Some(enough)) => format!("{enough} or less{missed}"),
         (Good::High, None) => "more is better".to_owned(),
         (Good::Low, None) => "less is better".to_owned(),
         (Good::Near(goal), _) => format!("near {}", value(measure, goal)),
@@ -225,9 +226,10 @@ fn good(measure: &Measure) -> String {
     }
 }
 
-/// A value of a measure with its unit.
+/// A value of a measure with its unit; a dash for one that isn't defined.
 fn value(measure: &Measure, value: f64) -> String {
     match measure.unit {
+        _ if value.is_nan() => "-".to_owned(),
         Unit::Share => format!("{:.1} %", 100.0 * value),
         Unit::Score => format!("{value:.3}"),
         Unit::Millimeters => format!("{value:.1} mm"),

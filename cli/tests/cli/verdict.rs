@@ -1,6 +1,6 @@
 //! What is said of a run at its end.
 
-use crate::workbench::Workbench;
+use crate::workbench::{Workbench, still};
 use serde_json::Value;
 
 /// A plan of many rounds, of which the first is soon done.
@@ -63,6 +63,52 @@ fn training_ends_with_a_verdict_and_what_is_good() {
         assert!(row.any(|row| row.contains(good)), "{measure}: {end}");
     }
     assert!(table.iter().all(|row| row.chars().count() <= 80), "{end}");
+}
+
+/// Each row with a bound says whether it misses it, and what isn't defined is no number.
+#[test]
+fn rows_that_miss_their_bound_are_marked_and_nothing_is_a_share_of_nothing() {
+    let bench = Workbench::with_run();
+    bench.write("still.txt", still().to_string().as_bytes());
+    let plan = ["train", "still.txt", "--preset", "tiny.json"];
+    let ends = [text(&bench, &plan), text(&bench, &["eval", "sway"])];
+    let mut missed = 0;
+    for line in ends.iter().flat_map(|end| end.lines()) {
+        let number = |text: &str| -> Option<f64> {
+            let digits = text.split_whitespace().rev().nth(1)?;
+            digits.parse().ok()
+        };
+        let mark = line.ends_with("  missed");
+        missed += usize::from(mark);
+        for (word, misses) in [
+            (" or more", f64::lt as fn(&f64, &f64) -> bool),
+            (" or less", f64::gt),
+        ] {
+            let Some((row, _)) = line.split_once(word) else {
+                continue;
+            };
+            let (row, bound) = row.split_at(row.rfind("  ").expect("columns"));
+            let (value, bound) = (number(row), number(bound));
+            let (value, bound) = (value.expect("a value"), bound.expect("a bound"));
+            assert_eq!(mark, misses(&value, &bound), "{line}");
+        }
+    }
+    assert!(missed > 0, "{ends:?}");
+    let row = ends[0]
+        .lines()
+        .find(|line| line.contains("angular momentum error"));
+    let cells: Vec<&str> = row.expect("it is listed").split_whitespace().collect();
+    assert_eq!(cells[3], "-", "{cells:?}");
+    let kept = bench.json(&["eval", "runs/still"]);
+    assert!(kept["angular_momentum_error"].is_null(), "{kept}");
+    // Who reads the run isn't stopped by it.
+    for line in [
+        &["runs"][..],
+        &["plot", "still"],
+        &["plot", "still", "--json"],
+    ] {
+        bench.mimic(line).assert().success();
+    }
 }
 
 #[test]

@@ -93,11 +93,22 @@ impl Workbench {
     }
 }
 
-/// A DeepMimic motion: per frame its duration, root position and rotation, then joint rotations.
+/// Somebody who stands and sways.
 fn sway() -> Value {
+    standing(0.1)
+}
+
+/// The same, who stands still.
+pub fn still() -> Value {
+    standing(0.0)
+}
+
+/// A DeepMimic motion: per frame its duration, root position and rotation, then joint rotations. The chest leans by so much,
+/// radians.
+fn standing(lean: f64) -> Value {
     let upright = [1.0, 0.0, 0.0, 0.0];
     let frame = |f: u32| {
-        let angle = 0.1 * (f64::from(f) / 30.0 * std::f64::consts::TAU).sin();
+        let angle = lean * (f64::from(f) / 30.0 * std::f64::consts::TAU).sin();
         let lean = [(angle / 2.0).cos(), (angle / 2.0).sin(), 0.0, 0.0];
         let mut row = vec![1.0 / 30.0, 0.0, 0.86, 0.0];
         row.extend(upright);

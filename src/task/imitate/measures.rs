@@ -19,6 +19,10 @@ const LOCAL_MM: f64 = 50.0;
 /// Global error, mm: nothing was asked. All skills there are below 98.
 const GLOBAL_MM: f64 = 100.0;
 
+/// Angular momentum that is none, kg·m²/s: no error is measured as a share of it. Chosen: a person who turns by a thousandth of
+/// a radian per second has about as much.
+const NO_MOMENTUM: f32 = 1e-3;
+
 /// Measures episodes of one case. `largest_momentum` is the largest angular momentum of its reference, kg·m²/s.
 pub fn measures(
     model: &CharacterModel,
@@ -64,7 +68,8 @@ fn success(model: &CharacterModel, episodes: &[Episode]) -> [Measure; 2] {
 }
 
 /// How far body positions are from the reference, in the world and with each skeleton's root position subtracted (without
-/// rotation alignment); how far velocities of link origins, centres of mass and angular momenta are: mean‖L − L̂‖ / max‖L̂‖.
+/// rotation alignment); how far velocities of link origins, centres of mass and angular momenta are: mean‖L − L̂‖ / max‖L̂‖,
+/// which is not defined where nothing turns in the reference.
 fn errors_of_frames(
     model: &CharacterModel,
     largest_momentum: f32,
@@ -80,7 +85,10 @@ fn errors_of_frames(
     let momentum = |f: &Frame, r: &ReferenceState| {
         f64::from((f.dynamics.angular_momentum - r.dynamics.angular_momentum).norm())
     };
-    let momentum = per_frame(&momentum) / f64::from(largest_momentum.max(1e-6));
+    let momentum = match largest_momentum > NO_MOMENTUM {
+        true => per_frame(&momentum) / f64::from(largest_momentum),
+        false => f64::NAN,
+    };
     [
         Measure::new("mpjpe_global_mm", "body error, global", body(false))
             .good(Good::Low, Unit::Millimeters)

@@ -5,28 +5,47 @@ use crate::task::{Measure, Performance, Verdict};
 /// Most start phases that the verdict names; the evaluation has them all.
 const NAMED: usize = 3;
 
-/// A motion is learned by who survives nearly all of it and stays close to it: both measures say which values are enough.
+/// A motion is learned by who survives nearly all of it and stays close to it: every measure that says which values are enough
+/// has to be enough.
 pub fn verdict(found: &Performance) -> Verdict {
-    let [survival, error] = ["survival", "mpjpe_local_mm"].map(|name| found.measure(name));
-    let lasts = survival.is_some_and(|survival| survival.is_enough());
-    let close = error.is_some_and(|error| error.is_enough());
-    let value = |measure: Option<&Measure>| measure.map_or(f64::NAN, |m| m.value);
-    match (lasts, close, found.failed) {
-        (true, true, []) => Verdict::learned(format!(
-            "learned: it lasts from all {} start phases",
-            found.episodes
-        )),
-        (true, true, failed) => {
-            Verdict::learned(format!("learned, but it fails from {}", phases(failed)))
+    match missed(found) {
+        Some(miss) => Verdict::not_yet(format!("not yet learned: {miss}")),
+        None => Verdict::learned(learned(found)),
+    }
+}
+
+/// What keeps a motion from being learned, the worst first.
+fn missed(found: &Performance) -> Option<String> {
+    let is_enough = |name: &str| found.measure(name).is_some_and(Measure::is_enough);
+    let value = |name: &str| found.measure(name).map_or(f64::NAN, |m| m.value);
+    if !is_enough("survival") {
+        let percent = 100.0 * value("survival");
+        return Some(format!("it lasts {percent:.0} % of the time"));
+    }
+    if !is_enough("mpjpe_local_mm") {
+        let error = value("mpjpe_local_mm");
+        return Some(format!("it lasts, but its bodies are {error:.0} mm off"));
+    }
+    let misses = |measure: &&Measure| measure.enough.is_some() && !measure.is_enough();
+    Some(match found.measures.iter().find(misses)?.name {
+        "mpjpe_global_mm" => format!(
+            "it lasts and keeps the pose, but is {:.0} mm away from where it should be",
+            value("mpjpe_global_mm")
+        ),
+        _ => format!("it fails from {}", phases(found.failed)),
+    })
+}
+
+/// How well it is learned.
+fn learned(found: &Performance) -> String {
+    let turning = found.measure("angular_momentum_error");
+    match found.failed {
+        // Whoever stands performs such a motion, trained or not.
+        [] if turning.is_some_and(|error| error.value.is_nan()) => {
+            "learned, but nothing turns in this motion, so there was little to learn".to_owned()
         }
-        (true, false, _) => Verdict::not_yet(format!(
-            "not yet learned: it lasts, but its bodies are {:.0} mm off",
-            value(error)
-        )),
-        (false, ..) => Verdict::not_yet(format!(
-            "not yet learned: it lasts {:.0} % of the time",
-            100.0 * value(survival)
-        )),
+        [] => format!("learned: it lasts from all {} start phases", found.episodes),
+        failed => format!("learned, but it fails from {}", phases(failed)),
     }
 }
 

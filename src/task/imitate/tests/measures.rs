@@ -178,3 +178,26 @@ fn momentum_and_turn_are_measured_against_the_references() {
         close(measure(&model, &spinning, name), expected, name);
     }
 }
+
+/// An error is no share of nothing: where the reference hardly turns, it isn't defined.
+#[test]
+fn momentum_of_a_reference_that_never_turns_has_no_error() {
+    let model = model();
+    let turning = episode(&model, |_, frame| {
+        frame.dynamics.angular_momentum = Vector3::new(0.0, 0.2, 0.0);
+    });
+    let error = |largest: f32| {
+        let all = measures(
+            &model,
+            &feet(&model),
+            largest,
+            std::slice::from_ref(&turning),
+        );
+        let error = all.iter().find(|m| m.name == "angular_momentum_error");
+        error.expect("it is measured").value
+    };
+    for largest in [0.0, 1e-6, 1e-4] {
+        assert!(error(largest).is_nan(), "{largest}");
+    }
+    close(error(0.4), 0.5, "a turn beside a reference that turns");
+}
