@@ -42,6 +42,18 @@ impl Problem {
         Self::new(id, Severity::Error, message.as_ref())
     }
 
+    /// The warning about a part that was to be kept to `to` seconds of what lasts `duration` seconds, where that costs a frame.
+    pub(crate) fn shortened(to: f64, duration: f64, fps: f64) -> Option<Self> {
+        let is_shorter = to.is_finite() && (to - duration) * fps > 0.5;
+        let end = (1e3 * duration).round() / 1e3;
+        is_shorter.then(|| {
+            Self::warning(
+                "part-shortened",
+                format!("the part to keep ends at {end} s and not at {to} s, because nothing comes after that"),
+            )
+        })
+    }
+
     fn new(id: &str, severity: Severity, message: &str) -> Self {
         Self {
             id: id.to_owned(),
@@ -55,7 +67,7 @@ impl Problem {
     pub fn parameter(&self) -> Option<Parameter> {
         Some(match self.id.as_str() {
             "several-takes" | "still-take" => Parameter::Take,
-            "first-frame-left-out" | "cycle-gap" => Parameter::Trim,
+            "first-frame-left-out" | "cycle-gap" | "part-shortened" => Parameter::Trim,
             "unit-guessed" | "invalid-unit" => Parameter::Unit,
             "up-axis-corrected" => Parameter::UpAxis,
             "unknown-loop-word" | "loop-gap" => Parameter::LoopMode,

@@ -3,7 +3,7 @@
 //! Rotations and translations follow cubic curves through the frames, so that a clip sampled at a higher rate has no
 //! kinks in its velocity, which a physics character would have to follow.
 
-use super::{Clip, Error, LoopMode, Margin};
+use super::{Clip, Error, LoopMode, Margin, Problem};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A rate within this fraction of the wanted one counts as the wanted one: files write 1/30 s as 0.033332, which is off by
@@ -203,7 +203,7 @@ impl Clip {
     }
 
     /// The part from `from` to `to` seconds, with up to two seconds around it as margins. It plays once: only the whole clip
-    /// still loops.
+    /// still loops. Where `to` is beyond the clip's end, it ends there, with a warning.
     ///
     /// # Errors
     /// An [`Error`] for a part that is empty, and for a clip that contradicts itself.
@@ -220,12 +220,18 @@ impl Clip {
                 duration,
             });
         }
-        if start <= 0.0 && end >= duration {
-            return Ok(self.clone());
-        }
-        let grid = self.grid(end - start, self.fps)?;
-        let mut part = self.sampled(start, grid, LoopMode::Clamp);
-        part.margin = self.margin_of(start, end, grid.fps);
+        let mut part = match start <= 0.0 && end >= duration {
+            true => self.clone(),
+            false => {
+                let grid = self.grid(end - start, self.fps)?;
+                let part = self.sampled(start, grid, LoopMode::Clamp);
+                let margin = self.margin_of(start, end, grid.fps);
+                Clip { margin, ..part }
+            }
+        };
+        let shortened = Problem::shortened(to, duration, self.fps);
+        let is_new = |problem: &Problem| !self.problems.contains(problem);
+        part.problems.extend(shortened.filter(is_new));
         Ok(part)
     }
 

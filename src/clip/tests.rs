@@ -131,7 +131,25 @@ fn trimming_takes_the_part_and_ends_the_loop() {
     );
     assert_relative_eq!(part.frames[0][0].translation.x, 0.4, epsilon = 1e-12);
     assert_relative_eq!(part.frames[9][0].translation.x, 1.0, epsilon = 1e-12);
-    assert_eq!(clip.trim(0.0, 99.0).expect("it trims"), clip);
+    assert_eq!(clip.trim(0.0, f64::INFINITY).expect("it trims"), clip);
+    // A number that the clip doesn't reach is said once, and one that costs no frame not at all.
+    for (from, to, said) in [
+        (0.0, 99.0, 1),
+        (0.3, 99.0, 1),
+        (0.0, 1.01, 0),
+        (0.3, 1.0, 0),
+    ] {
+        let part = clip.trim(from, to).expect("it trims");
+        let again = part.trim(0.0, 99.0).expect("it trims");
+        let count = |clip: &Clip| {
+            clip.problems
+                .iter()
+                .filter(|p| p.id == "part-shortened")
+                .count()
+        };
+        assert_eq!(count(&part), said, "{from}..{to}");
+        assert!(count(&again) >= 1, "{from}..{to}");
+    }
     assert!(clip.trim(1.5, 2.0).is_err());
     assert!(clip.trim(0.5, 0.2).is_err());
     assert!(clip.trim(f64::NAN, 1.0).is_err());

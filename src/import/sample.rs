@@ -67,6 +67,8 @@ pub(super) fn clip(
     problems.extend_from_slice(&about.problems);
     problems.extend((sampled.left_out_first && options.trim.is_none()).then(lead::problem));
     problems.extend(rate_problem(sampled.fps, fps));
+    let end = options.trim.map(|(_, to)| to);
+    problems.extend(end.and_then(|to| Problem::shortened(to, about.end - about.start, fps)));
     problems.extend(still_problem(&sampled.own));
     problems.extend_from_slice(&rig.problems);
     Ok(Clip {

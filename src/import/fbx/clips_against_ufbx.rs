@@ -51,7 +51,7 @@ pub(super) fn check(file: &str, scene: &FbxScene, oracle: &ufbx::Scene) -> f64 {
     for (index, take) in scene.takes().iter().enumerate() {
         let options = Options {
             take: Some(take.name.clone()),
-            trim: Some((0.0, f64::MAX)),
+            trim: Some((0.0, f64::INFINITY)),
             ..Options::default()
         };
         let clip = match import::read(&binary, file, None, &options) {
