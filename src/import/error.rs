@@ -35,6 +35,8 @@ pub enum ErrorKind {
     UnknownTake {
         /// What was asked for.
         wanted: String,
+        /// How many takes the file has.
+        count: usize,
         /// The takes of the file to choose from, with their numbers, at most eight of them.
         takes: String,
         /// The take that was probably meant.
@@ -129,9 +131,10 @@ impl ErrorKind {
             }
             Self::UnknownTake {
                 wanted,
+                count,
                 takes,
                 meant,
-            } => wrong(format!("no take is called `{wanted}`")).remedy_by(
+            } => wrong(no_take(wanted, *count)).remedy_by(
                 Parameter::Take,
                 match meant {
                     Some(meant) => format!("did you mean `{meant}`? choose {takes}"),
@@ -185,5 +188,15 @@ impl ErrorKind {
             ),
             Self::Mirror { source } => source.explain(),
         }
+    }
+}
+
+/// That a take isn't there: by its number, if it is one, or by its name.
+fn no_take(wanted: &str, count: usize) -> String {
+    let is_number = !wanted.is_empty() && wanted.bytes().all(|b| b.is_ascii_digit());
+    let takes = if count == 1 { "take" } else { "takes" };
+    match is_number {
+        true => format!("there is no take number {wanted}: the file has {count} {takes}"),
+        false => format!("no take is called `{wanted}`"),
     }
 }

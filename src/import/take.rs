@@ -29,11 +29,13 @@ pub(crate) fn choose(
     }
     let unknown = |wanted: &str| ErrorKind::UnknownTake {
         wanted: wanted.to_owned(),
+        count: scene.takes().len(),
         takes: match scene.takes() {
             [only] => format!("`{}`, the only one", only.name),
             _ => format!("one of {}", list(scene)),
         },
-        meant: meant(wanted, scene.takes().iter().map(|take| &take.name)),
+        meant: meant(wanted, scene.takes().iter().map(|take| &take.name))
+            .map(|name| short(scene, &name).to_owned()),
     };
     let (take, note) = match wanted {
         Some(wanted) => (find(scene, wanted).ok_or_else(|| unknown(wanted))?, None),
@@ -76,6 +78,16 @@ fn find(scene: &dyn Scene, wanted: &str) -> Option<usize> {
             let number: usize = wanted.parse().ok()?;
             number.checked_sub(1).filter(|&at| at < scene.takes().len())
         })
+}
+
+/// What follows an armature's name, if it means the take alone: a shell takes a `|` for a command of its own.
+fn short<'a>(scene: &dyn Scene, name: &'a str) -> &'a str {
+    let last = name.rsplit('|').next().unwrap_or(name);
+    let whole = scene.takes().iter().position(|take| take.name == name);
+    match find(scene, last) {
+        found if found.is_some() && found == whole => last,
+        _ => name,
+    }
 }
 
 fn list(scene: &dyn Scene) -> String {
