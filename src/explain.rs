@@ -5,7 +5,7 @@
 
 mod near;
 
-pub use near::{did_you_mean, meant, nearest};
+pub use near::{did_you_mean, meant, meant_file, nearest};
 
 use std::fmt;
 use std::path::{Path, PathBuf};

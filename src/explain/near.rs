@@ -1,6 +1,8 @@
 //! Which of the known names somebody may have meant by one that isn't known.
 
 use std::cmp::Reverse;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use strsim::osa_distance;
 
 /// Most characters of a name that are compared. Names come from files and may be endless, and the comparison takes time in
@@ -17,16 +19,18 @@ pub fn nearest<S: AsRef<str>>(
     count: usize,
 ) -> Vec<String> {
     let typed = Name::new(typed);
-    let mut near: Vec<(usize, Reverse<bool>, S)> = known
+    let mut near: Vec<(_, S)> = known
         .into_iter()
         .map(|name| {
             let other = Name::new(name.as_ref());
-            (typed.distance(&other), Reverse(typed.within(&other)), name)
+            let whole = edits(&typed.whole, &other.whole);
+            let part = Reverse(typed.within(&other));
+            ((typed.distance(&other), part, whole), name)
         })
         .collect();
     // Stable, so that of equally near names the first stays first.
-    near.sort_by_key(|(distance, part, _)| (*distance, *part));
-    let names = near.iter().map(|(.., name)| name.as_ref().to_owned());
+    near.sort_by_key(|(distance, _)| *distance);
+    let names = near.iter().map(|(_, name)| name.as_ref().to_owned());
     names.take(count).collect()
 }
 
@@ -38,6 +42,33 @@ pub fn meant<S: AsRef<str>>(typed: &str, known: impl IntoIterator<Item = S>) -> 
         .into_iter()
         .filter(|name| wanted.is_near(&Name::new(name.as_ref())));
     nearest(typed, close, 1).pop()
+}
+
+/// The known file that was probably meant, as [`meant`] for names of files: what is before the ending has to be near, for
+/// many files have one ending, and of those that are, the one whose whole name is nearest was meant. A file may stand there
+/// without its ending.
+pub fn meant_file(typed: &str, known: impl IntoIterator<Item = PathBuf>) -> Option<PathBuf> {
+    let whole = |name: &str| Name {
+        last: Vec::new(),
+        ..Name::new(name)
+    };
+    let stem = |name: &str| {
+        whole(
+            Path::new(name)
+                .file_stem()
+                .map_or(name.into(), OsStr::to_string_lossy)
+                .as_ref(),
+        )
+    };
+    let (wanted, before) = (whole(typed), stem(typed));
+    let near = known.into_iter().filter_map(|path| {
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        let (own, own_before) = (whole(&name), stem(&name));
+        let is_near = before.is_near(&own_before) || wanted.is_near(&own_before);
+        let distance = edits(&wanted.whole, &own.whole);
+        is_near.then_some((distance, path))
+    });
+    near.min().map(|(_, path)| path)
 }
 
 /// The question that goes with [`meant`], in front of other advice.
@@ -124,6 +155,41 @@ mod tests {
             meant("Kick", ["Armature|Kick"]).as_deref(),
             Some("Armature|Kick")
         );
+    }
+
+    #[test]
+    fn of_files_the_whole_name_counts_and_no_ending_alone() {
+        let known = [
+            "01_01.motion",
+            "01_01.clip",
+            "kick.clip",
+            "kick.motion",
+            "kick-edited.clip",
+            "walk.fbx",
+        ];
+        for (typed, file) in [
+            ("kick.motin", Some("kick.motion")),
+            ("kick.clp", Some("kick.clip")),
+            ("kik.clip", Some("kick.clip")),
+            ("KICK.MOTION", Some("kick.motion")),
+            ("kick-edit.clip", Some("kick-edited.clip")),
+            ("walk.glb", Some("walk.fbx")),
+            ("walk", Some("walk.fbx")),
+            ("01_1.clip", Some("01_01.clip")),
+            ("jump.clip", None),
+            ("run.motion", None),
+            (".motion", None),
+        ] {
+            let found = meant_file(typed, known.map(PathBuf::from));
+            assert_eq!(found, file.map(PathBuf::from), "{typed}");
+        }
+    }
+
+    #[test]
+    fn of_names_with_equally_near_endings_the_nearest_comes_first() {
+        let known = ["arm.Hip", "leg.Hip", "leg.Knee"];
+        assert_eq!(nearest("lag.Hip", known, 1), ["leg.Hip"]);
+        assert_eq!(nearest("Hip", known, 2), ["arm.Hip", "leg.Hip"]);
     }
 
     #[test]
