@@ -2,6 +2,7 @@
 
 use super::Format;
 use super::read::unread;
+use super::unwritten::unwritten;
 use crate::explain::{Explain, Explanation, explained};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -103,8 +104,7 @@ impl Explain for FileError {
         } = self.format;
         let told = match &self.flaw {
             Flaw::Read(source) => unread(source),
-            Flaw::Write(source) => Explanation::work(format!("cannot be written ({source})"))
-                .remedy("check the path, its permissions and the free space on the disk"),
+            Flaw::Write(source) => unwritten(&self.path, source),
             Flaw::TooLarge { most } => Explanation::input(format!(
                 "this {name} is too large for a file: it would need more than {most} bytes, the most that can be read again"
             ))

@@ -11,6 +11,7 @@ mod made;
 mod read;
 mod tensors;
 mod unfinished;
+mod unwritten;
 
 pub use error::{FileError, Flaw};
 pub use format::Format;
@@ -19,6 +20,7 @@ pub use made::{holds, made_by};
 pub use read::{read_at_most, text_at_most, unread};
 pub(crate) use tensors::{Reader, Writer, format_of, load, save};
 pub use unfinished::Unfinished;
+pub use unwritten::unwritten;
 
 use std::fs::File;
 use std::io::{self, Write};

@@ -2,7 +2,7 @@
 
 use crate::evaluate::EvaluateError;
 use crate::explain::{Explain, Explanation, Fault, Parameter, explained};
-use crate::file::{FileError, Holder, LOCK, LockError, unread};
+use crate::file::{FileError, Flaw, Holder, LOCK, LockError, unread, unwritten};
 use crate::learn::LearnError;
 use crate::motion::MotionError;
 use crate::skeleton::SkeletonError;
@@ -139,10 +139,14 @@ impl RunError {
         }
     }
 
-    /// Whether the run's folder or disk refuses to be written, so that the run can go on from its last checkpoint.
+    /// Whether the run's folder or disk refuses to be written, or something is in the way there, so that the run can go on from its last checkpoint.
     pub fn is_write(&self) -> bool {
-        let file = matches!(self, Self::Write { .. } | Self::File(_) | Self::Motion(_));
-        file && self.explain().fault == Fault::Work
+        match self {
+            Self::Write { .. } => true,
+            Self::File(error) => matches!(error.flaw, Flaw::Write(_)),
+            Self::Motion(_) => self.explain().fault == Fault::Work,
+            _ => false,
+        }
     }
 }
 
@@ -150,11 +154,7 @@ impl Explain for RunError {
     fn explain(&self) -> Explanation {
         match self {
             Self::Read { path, source } => unread(source).file(path),
-            Self::Write { path, source } => {
-                Explanation::work(format!("cannot be written ({source})"))
-                    .file(path)
-                    .remedy("check the path, its permissions and the free space on the disk")
-            }
+            Self::Write { path, source } => unwritten(path, source),
             Self::Exists(path) => Explanation::input("this folder already holds a run")
                 .file(path)
                 .remedy_by(
