@@ -36,11 +36,11 @@ pub fn advice(checks: &[Check]) -> String {
     text
 }
 
-/// The flags that the advice is about, in brackets: ` (`--trim`)`.
+/// The flags that the advice is about, in brackets: ` (`--trim A..B`)`.
 fn flags(check: &Check) -> String {
     let flag = |parameter: &Parameter| match parameter {
         // The only one that isn't a flag of importing or retargeting.
-        Parameter::Speed => Some("`mimic edit --speed`".to_owned()),
+        Parameter::Speed => Some("`mimic edit --speed FACTOR`".to_owned()),
         other => flag(*other).map(|flag| format!("`{flag}`")),
     };
     let flags: Vec<String> = check.parameters.iter().filter_map(flag).collect();

@@ -4,27 +4,28 @@
 //! is added here is the name of the flag to change. Exit code 2 is for what the user can mend, 1 for work that failed.
 
 use mimic::explain::{Explain, Explanation, Fault, Parameter, Remedy, plain};
-use mimic::file::unread;
+use mimic::file::{unread, unwritten};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
-/// The flag that sets a parameter of the library.
+/// The flag that sets a parameter of the library, with what is to be given for its value.
 pub fn flag(parameter: Parameter) -> Option<&'static str> {
     Some(match parameter {
-        Parameter::Take => "--take",
-        Parameter::FrameRate => "--fps",
-        Parameter::Trim => "--trim",
-        Parameter::Unit => "--unit",
-        Parameter::UpAxis => "--up",
-        Parameter::LoopMode => "--loop",
-        Parameter::JointMap => "--map",
-        Parameter::SlotWeight => "--weight",
-        Parameter::Skeleton => "--skeleton",
-        Parameter::Speed => "--speed",
-        Parameter::Output => "--out",
+        Parameter::Take => "--take TAKE",
+        Parameter::FrameRate => "--fps HZ",
+        Parameter::Trim => "--trim A..B",
+        Parameter::Unit => "--unit METRES",
+        Parameter::UpAxis => "--up AXIS",
+        // Whether it repeats was decided by the motion; who disagrees mostly has a motion that doesn't.
+        Parameter::LoopMode => "--loop clamp",
+        Parameter::JointMap => "--map FILE",
+        Parameter::SlotWeight => "--weight SLOT=X",
+        Parameter::Skeleton => "--skeleton NAME",
+        Parameter::Speed => "--speed FACTOR",
+        Parameter::Output => "--out PATH",
         _ => return None,
     })
 }
@@ -83,8 +84,7 @@ impl Failure {
         while let Some(source) = reason.source() {
             reason = source;
         }
-        Self::new(Explanation::work(format!("cannot be written ({reason})")).file(file))
-            .with_remedy("check the path, its permissions and the free space on the disk")
+        Self::new(unwritten(file, &io::Error::other(reason.to_string())))
     }
 
     /// Output that cannot be printed.
@@ -172,7 +172,7 @@ impl<E: Explain> From<E> for Failure {
     }
 }
 
-/// The advice with its flag: "choose another take (`--take`)".
+/// The advice with its flag: "choose another take (`--take TAKE`)".
 fn remedy(parts: &Explanation) -> Option<String> {
     let Remedy { advice, parameter } = parts.remedy.as_ref()?;
     Some(match parameter.and_then(flag) {
@@ -201,13 +201,13 @@ mod tests {
             .place("take `Kick`")
             .remedy_by(Parameter::Take, "choose another take");
         let failure = Failure::new(parts);
-        let line = "`kick.fbx`: take `Kick`: it has no frames; choose another take (`--take`)";
+        let line = "`kick.fbx`: take `Kick`: it has no frames; choose another take (`--take TAKE`)";
         assert_eq!(failure.message().as_deref(), Some(line));
         let expected = json!({
             "message": line,
             "file": "kick.fbx",
             "place": "take `Kick`",
-            "remedy": "choose another take (`--take`)",
+            "remedy": "choose another take (`--take TAKE`)",
             "exit": 2,
         });
         assert_eq!(failure.json(), expected);

@@ -1,9 +1,8 @@
 //! Finding inputs: by path, by name in the library folder or in `runs/`, or the newest one.
 
 use crate::failure::{Failure, Outcome};
+use crate::shell;
 use mimic::run::files;
-use std::collections::BTreeMap;
-use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -67,7 +66,7 @@ fn is_absence(error: &io::Error) -> bool {
 
 /// The failure of a command that was given a folder for a file.
 fn folder(wanted: &Path) -> Failure {
-    let name = wanted.display();
+    let name = shell::path(wanted);
     let (cause, remedy) = match is_run(wanted) {
         true => (
             "this is the folder of a run, and the command takes a clip or a motion",
@@ -268,7 +267,9 @@ pub fn absent_run(wanted: &Path) -> Failure {
     };
     let cause = match wanted.is_file() {
         true => "this is a file, and a run is a folder".to_owned(),
-        false if is_name(wanted) => format!("there is no run here or in `{RUNS}/`"),
+        false if is_name(wanted) => {
+            format!("there is no run of this name, neither here nor in `{RUNS}/`")
+        }
         false if wanted.is_dir() => "there is no run in this folder".to_owned(),
         false => "there is no such folder".to_owned(),
     };
@@ -322,24 +323,10 @@ fn beside(wanted: &Path) -> impl Iterator<Item = PathBuf> + use<> {
 }
 
 /// The question whether the most similar of these paths was meant; their folders are that of `wanted`, or are left out.
-/// A name without its extension counts as well.
 fn meant(wanted: &Path, known: impl Iterator<Item = PathBuf>) -> Option<String> {
     let name = wanted.file_name()?.to_string_lossy();
-    let with_stem = known.flat_map(|path| {
-        let name = |part: Option<&OsStr>| part.map(|name| name.to_string_lossy().into_owned());
-        let names = [name(path.file_name()), name(path.file_stem())];
-        names
-            .into_iter()
-            .flatten()
-            .map(move |name| (name, path.clone()))
-    });
-    // The first of one name is what a command would take.
-    let mut paths = BTreeMap::new();
-    for (name, path) in with_stem {
-        paths.entry(name).or_insert(path);
-    }
-    let found = mimic::explain::meant(&name, paths.keys())?;
-    Some(format!("did you mean `{}`?", paths[&found].display()))
+    let found = mimic::explain::meant_file(&name, known)?;
+    Some(format!("did you mean `{}`?", found.display()))
 }
 
 /// The first few names of files or folders, without extensions, in a sentence.

@@ -15,6 +15,7 @@ mod printer;
 mod progress;
 mod recording;
 mod runs;
+mod shell;
 mod verbs;
 mod viewer;
 

@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use crate::progress;
+use crate::shell;
 use mimic::clip::{Clip, Problem};
 use mimic::file::text_at_most;
 use mimic::humanoid::HumanoidMap;
@@ -12,7 +13,7 @@ use mimic::import;
 use mimic::motion::Motion;
 use mimic::retarget;
 use mimic::skeleton::Skeleton;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A motion, and the skeleton that it moves.
 pub struct Prepared {
@@ -67,9 +68,8 @@ impl Preparation {
 
     /// Reads the motion, or makes it, and says what was found on the way.
     pub fn run(&self, printer: &Printer) -> Outcome<Prepared> {
-        let prepared = self.prepare(printer)?;
-        printer.problems(&prepared.problems);
-        Ok(prepared)
+        let mut prepared = Self::run_all(std::slice::from_ref(self), printer)?;
+        Ok(prepared.remove(0))
     }
 
     /// The same for several files, of which what repeats is said once.
@@ -78,7 +78,12 @@ impl Preparation {
         let prepared: Vec<Prepared> = prepared.collect::<Outcome<_>>()?;
         let files = all.iter().map(|one| one.file.display().to_string());
         let problems = prepared.iter().map(|one| one.problems.as_slice());
-        printer.problems_of(&files.zip(problems).collect::<Vec<_>>());
+        let found: Vec<_> = files.zip(problems).collect();
+        let sources = all.iter().zip(&found);
+        // A clip says the same of the file that it was made from.
+        let sources = sources.filter(|(one, _)| !locate::has_extension(&one.file, "clip"));
+        printer.choices(&sources.map(|(_, found)| found.clone()).collect::<Vec<_>>());
+        printer.problems_of(&found);
         Ok(prepared)
     }
 
@@ -154,7 +159,8 @@ impl Preparation {
             let name = &motion.skeleton_name;
             let cause =
                 format!("this motion was made for the character `{name}`, which is not built in");
-            let remedy = format!("give the character's file with `--skeleton {name}.xml`");
+            let file = shell::path(Path::new(&format!("{name}.xml")));
+            let remedy = format!("give the character's file with `--skeleton {file}`");
             Failure::input(&self.file, cause).with_remedy(remedy)
         })
     }

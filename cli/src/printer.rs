@@ -127,6 +127,27 @@ impl Printer {
         }
     }
 
+    /// Says which take was chosen of files that have several, for these are read for the first time: once, for the first of
+    /// them, with a count.
+    pub fn choices(&self, files: &[(String, &[Problem])]) {
+        let chosen = files.iter().filter_map(|(file, problems)| {
+            let choice = problems
+                .iter()
+                .find(|problem| problem.id == "several-takes");
+            Some((file, choice?))
+        });
+        let chosen: Vec<_> = chosen.collect();
+        // Who asked for notes has it already.
+        let Some((file, first)) = chosen.first().filter(|_| !self.verbose) else {
+            return;
+        };
+        let more = match chosen.len() - 1 {
+            0 => String::new(),
+            more => format!(", and {more} more like it"),
+        };
+        self.say(format!("note: `{file}`: {}{more}", words(first)));
+    }
+
     /// Says what was found in several files. A warning that repeats is said once, for the first of them, with a count.
     pub fn problems_of(&self, files: &[(String, &[Problem])]) {
         if let [(_, only)] = files {
@@ -210,7 +231,12 @@ impl Printer {
 /// A problem in words, with the flag that decides otherwise and its id.
 fn words(problem: &Problem) -> String {
     let Problem { id, message, .. } = problem;
-    match problem.parameter().and_then(flag) {
+    let flag = match id.as_str() {
+        // Nobody knows which of the two was meant.
+        "unknown-loop-word" => Some("--loop wrap` or `--loop clamp"),
+        _ => problem.parameter().and_then(flag),
+    };
+    match flag {
         Some(flag) => format!("{message} (`{flag}`) [{id}]"),
         None => format!("{message} [{id}]"),
     }

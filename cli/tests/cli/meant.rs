@@ -41,6 +41,30 @@ fn names_that_are_nearly_right_are_understood() {
     }
 }
 
+/// Many files end alike: the rest of a name has to be near.
+#[test]
+fn endings_alone_are_no_likeness() {
+    let bench = Workbench::with_clip();
+    for clip in ["kick.clip", "01_01.clip", "01_01-edited.clip"] {
+        bench
+            .mimic(&["import", "sway.txt", "--out", clip])
+            .assert()
+            .success();
+        bench.mimic(&["retarget", clip]).assert().success();
+    }
+    for (line, meant) in [
+        (&["tracks", "kick.motin"][..], "kick.motion"),
+        (&["info", "kick.clp"], "kick.clip"),
+        (&["train", "01_01-edit.motion"], "01_01-edited.motion"),
+        (&["edit", "01_1.clip", "--mirror"], "01_01.clip"),
+    ] {
+        let said = remedy(&bench, line);
+        assert_eq!(said, format!("did you mean `{meant}`?"), "{line:?}");
+    }
+    let said = remedy(&bench, &["tracks", "jump.motion"]);
+    assert!(!said.contains("did you mean"), "{said}");
+}
+
 #[test]
 fn what_is_like_nothing_gets_a_list() {
     let bench = Workbench::with_run();

@@ -32,7 +32,7 @@ fn what_retargeting_finds_is_said_once() {
     let said = talk(&bench, &["retarget", "gap.txt"]);
     assert_eq!(said.matches("[loop-gap]").count(), 1, "{said}");
     assert!(
-        said.contains("(`--loop`) [loop-gap]"),
+        said.contains("(`--loop clamp`) [loop-gap]"),
         "the flag that decides otherwise: {said}"
     );
     let report = bench.json(&["retarget", "gap.txt"]);
