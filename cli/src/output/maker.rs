@@ -9,6 +9,8 @@ pub struct Maker {
     verb: &'static str,
     inputs: Vec<PathBuf>,
     detail: String,
+    /// What the detail is, in words that go on from "made".
+    by: &'static str,
 }
 
 impl Maker {
@@ -19,6 +21,7 @@ impl Maker {
             verb,
             inputs: inputs.map(|input| input.as_ref().to_owned()).collect(),
             detail: String::new(),
+            by: "",
         }
     }
 
@@ -28,14 +31,29 @@ impl Maker {
         Self { detail, ..self }
     }
 
+    /// With what the detail is: `" with the same edits"`.
+    pub fn by(self, by: &'static str) -> Self {
+        Self { by, ..self }
+    }
+
+    /// What it makes, in words: "what `mimic edit` made from `kick.clip` with the same edits".
+    pub fn what(&self) -> String {
+        let inputs: Vec<String> = self
+            .inputs()
+            .map(|input| format!("`{}`", input.display()))
+            .collect();
+        let from = match inputs.as_slice() {
+            [] => String::new(),
+            [one] => format!(" from {one}"),
+            [one, two] => format!(" from {one} and {two}"),
+            [one, more @ ..] => format!(" from {one} and {} others", more.len()),
+        };
+        format!("what `mimic {}` made{from}{}", self.verb, self.by)
+    }
+
     /// The inputs.
     pub fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.inputs.iter().map(PathBuf::as_path)
-    }
-
-    /// The first input.
-    pub fn first(&self) -> Option<&Path> {
-        self.inputs().next()
     }
 
     /// What a result at `path` says about its maker: a digest, because a file that is handed on shouldn't tell the paths of
@@ -82,6 +100,25 @@ mod tests {
         assert_eq!(
             way("/a/b/c", "/a/d/kick.fbx"),
             Path::new("../../d/kick.fbx")
+        );
+    }
+
+    #[test]
+    fn a_maker_says_what_it_makes() {
+        let what = |inputs: &[&str]| Maker::new("plot", inputs).what();
+        assert_eq!(what(&[]), "what `mimic plot` made");
+        assert_eq!(what(&["a"]), "what `mimic plot` made from `a`");
+        assert_eq!(what(&["a", "b"]), "what `mimic plot` made from `a` and `b`");
+        assert_eq!(
+            what(&["a", "b", "c"]),
+            "what `mimic plot` made from `a` and 2 others"
+        );
+        let edit = Maker::new("edit", ["a"])
+            .with("x")
+            .by(" with the same edits");
+        assert_eq!(
+            edit.what(),
+            "what `mimic edit` made from `a` with the same edits"
         );
     }
 

@@ -166,11 +166,7 @@ impl Output {
     }
 
     fn refused(&self) -> Failure {
-        let what = match self.maker.first() {
-            Some(input) => format!("what the same command made from `{}`", input.display()),
-            None => "what the same command made".to_owned(),
-        };
-        let cause = format!("this exists already, and it is not {what}");
+        let cause = format!("this exists already, and it is not {}", self.maker.what());
         let remedy = format!("{}, or replace this one with `--force`", self.elsewhere());
         Failure::input(&self.path, cause).with_remedy(remedy)
     }

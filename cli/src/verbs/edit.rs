@@ -103,7 +103,9 @@ impl Args {
         let stem = first.file_stem().unwrap_or_default().to_string_lossy();
         let path = result_path(self.out.as_deref(), &format!("{stem}-edited"), Form::Clip);
         // Other edits of the same clips are another clip.
-        let maker = Maker::new("edit", &inputs).with(format!("{:?}", self.edits));
+        let maker = Maker::new("edit", &inputs)
+            .with(format!("{:?}", self.edits))
+            .by(" with the same edits");
         let output = Output::new(path, Form::Clip, maker, "--out", self.replace.force);
         output.check()?;
         let mut clips = Vec::with_capacity(inputs.len());

@@ -7,6 +7,7 @@ use crate::locate;
 use crate::output::{Form, Maker, Output, names_folder, result_path, safe_name};
 use crate::printer::Printer;
 use crate::progress;
+use crate::shell;
 use mimic::explain::plain;
 use mimic::import;
 use serde_json::json;
@@ -68,7 +69,9 @@ impl Args {
         bar.finish_and_clear();
         let files = reports.iter().map(|report| report.file().to_owned());
         let problems = reports.iter().map(ClipReport::problems);
-        printer.problems_of(&files.zip(problems).collect::<Vec<_>>());
+        let found: Vec<_> = files.zip(problems).collect();
+        printer.choices(&found);
+        printer.problems_of(&found);
         if let ([_], false) = (&steps[..], self.wants_all()) {
             failures.pop().map_or(Ok(()), |(_, failure)| Err(failure))?;
             return reports
@@ -82,9 +85,13 @@ impl Args {
     fn plan(&self, library: &Path) -> Outcome<Vec<Step>> {
         let many = self.files.len() > 1 || self.wants_all();
         if let Some(out) = self.out.as_deref().filter(|out| many && !names_folder(out)) {
-            let out = out.display();
-            let cause = format!("several clips cannot be written to one file, `{out}`");
-            return Err(Failure::user(cause).with_remedy(format!("name a folder: `--out {out}/`")));
+            let cause = format!(
+                "several clips cannot be written to one file, `{}`",
+                out.display()
+            );
+            let folder = shell::path(&out.with_extension(""));
+            let remedy = format!("name a folder: `--out {folder}/`");
+            return Err(Failure::user(cause).with_remedy(remedy));
         }
         let mut taken = BTreeMap::new();
         let mut steps = Vec::new();
@@ -99,7 +106,9 @@ impl Args {
                     return Err(Failure::input(&input, cause)
                         .with_remedy("import the two into different folders (`--out`)"));
                 }
-                let maker = Maker::new("import", [&input]).with(&name);
+                let maker = Maker::new("import", [&input])
+                    .with(&name)
+                    .by(" of the same take");
                 steps.push(Step {
                     input: input.clone(),
                     take,

@@ -52,7 +52,13 @@ impl Args {
         }
         let name = preparation.name();
         let path = result_path(self.out.as_deref(), &name, Form::Motion);
-        let maker = Maker::new("retarget", [&file]).with(name);
+        // A motion of another character is another motion.
+        let detail = match self.retarget.skeleton.as_deref() {
+            None | Some("humanoid") => name,
+            Some(other) => format!("{name} on {other}"),
+        };
+        let maker = Maker::new("retarget", [&file]).with(detail);
+        let maker = maker.by(" for the same character and take");
         let output = Output::new(path, Form::Motion, maker, "--out", self.replace.force);
         output.check()?;
         let Prepared {

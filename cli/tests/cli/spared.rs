@@ -383,3 +383,114 @@ fn unfinished_files_of_killed_processes_are_removed() {
         assert_eq!(leftovers(&bench), [".mimic-mine"]);
     }
 }
+
+/// A result of other options or of another character is another result, and the refusal says what is compared.
+#[test]
+fn what_differs_is_said() {
+    let bench = Workbench::with_run();
+    for (first, second, what) in [
+        (
+            &["edit", "sway.txt", "--mirror"][..],
+            &["edit", "sway.txt", "--speed", "2"][..],
+            "`mimic edit` made from `sway.txt` with the same edits;",
+        ),
+        (
+            &["retarget", "sway.txt"],
+            &["retarget", "sway.txt", "--skeleton", "robot"],
+            "`mimic retarget` made from `sway.txt` for the same character and take;",
+        ),
+        (
+            &["plot", "sway", "--out", "a.svg"],
+            &["plot", "sway", "runs/sway", "--out", "a.svg"],
+            "`mimic plot` made from `runs/sway` and `runs/sway`;",
+        ),
+        (
+            &["plot", "sway"],
+            &["tracks", "sway.txt", "--plot", "sway.svg"],
+            "`mimic tracks` made from `sway.txt`;",
+        ),
+    ] {
+        bench.mimic(first).assert().success();
+        bench.mimic(first).assert().success();
+        let said = bench.complaint(second, 2);
+        assert!(said.contains(&format!("it is not what {what}")), "{said}");
+        bench
+            .mimic(&[second, &["--force"]].concat())
+            .assert()
+            .success();
+        bench.mimic(second).assert().success();
+        bench.complaint(first, 2);
+    }
+}
+
+/// What lies in the way of a run's own files is for its owner to move.
+#[test]
+fn what_is_in_the_way_of_a_runs_files_is_told() {
+    for file in [
+        "eval.json",
+        "policy.safetensors",
+        "replay.rrd",
+        "metrics.jsonl",
+        "checkpoint.safetensors",
+    ] {
+        let bench = Workbench::with_clip();
+        bench.write("long.json", br#"{ "environments": 4, "group": 4, "horizon": 8, "round": 1, "samples": 96, "hidden": [8] }"#);
+        let line = [
+            "train",
+            "sway.txt",
+            "--preset",
+            "long.json",
+            "--minutes",
+            "1e-9",
+        ];
+        bench.mimic(&line).assert().success();
+        for link in [false, true] {
+            let path = bench.path("runs/sway").join(file);
+            match path.is_dir() {
+                true => fs::remove_dir(&path),
+                false => fs::remove_file(&path),
+            }
+            .ok();
+            match link {
+                #[cfg(unix)]
+                true => std::os::unix::fs::symlink(&path, &path).expect("linked"),
+                #[cfg(not(unix))]
+                true => continue,
+                false => fs::create_dir(&path).expect("made"),
+            }
+            // A link is replaced by who writes a whole file.
+            let output = bench.mimic(&["train", "--resume", "sway"]).assert();
+            let output = output.get_output();
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            match output.status.code() {
+                Some(0) if link => continue,
+                code => assert_eq!(code, Some(2), "{file}, link {link}: {said}"),
+            }
+            assert!(said.contains(file) && said.contains("; "), "{said}");
+        }
+    }
+}
+
+#[test]
+fn names_that_no_file_can_have_are_refused() {
+    let bench = Workbench::with_run();
+    let long = "x".repeat(5000);
+    let (clip, rrd) = (format!("{long}.clip"), format!("{long}.rrd"));
+    for line in [
+        &["import", "sway.txt", "--out", &clip][..],
+        &["edit", "sway.txt", "--mirror", "--out", &clip],
+        &["replay", "sway.txt", "--save", &rrd],
+        &["train", "sway.txt", "--preset", "tiny.json", "--out", &long],
+        &["eval", "sway", "--out", &long],
+        &["info", &clip],
+        &["eval", &long],
+        &["train", &clip],
+        &["runs", &long],
+        &["retarget", "sway.txt", "--map", &long],
+        &["train", "sway.txt", "--preset", &long],
+        &["train", "sway.txt", "--skeleton", &long],
+    ] {
+        let said = bench.complaint(line, 2);
+        assert!(said.len() < 20_000, "{}", said.len());
+    }
+}
