@@ -69,8 +69,11 @@ pub fn record(run: &Run, start: EpisodeStart, seconds: f64) -> Outcome<Recording
         let motions = if count == 1 { "motion" } else { "motions" };
         let number = start.case + 1;
         let cause = format!("this run learned {count} {motions}, so there is no number {number}");
-        return Err(Failure::input(run.dir(), cause)
-            .with_remedy(format!("choose a number from 1 to {count}")));
+        let remedy = match count {
+            1 => "leave `--motion` out".to_owned(),
+            count => format!("choose a number from 1 to {count} with `--motion`"),
+        };
+        return Err(Failure::input(run.dir(), cause).with_remedy(remedy));
     };
     let episodes = perform(&controller, &[start], seconds).map_err(|e| blame(run, e))?;
     shown(&motion.name, &controller, &episodes[0])

@@ -6,6 +6,8 @@ use crate::locate;
 use crate::output::{self, Form, Maker, Output};
 use crate::printer::Printer;
 use crate::runs;
+use crate::shell;
+use crate::verbs::train::program;
 use mimic::evaluate::{FailedEpisode, Options};
 use mimic::explain::plain;
 use mimic::run::{CaseEvaluation, Run, RunError};
@@ -18,6 +20,22 @@ Examples:
   mimic eval kick --episodes 64 --out kick-64.json
   mimic eval kick --perturb                  disturb the agent by shoves, too
   mimic eval kick --json                     print the fields of eval.json
+
+Episodes start at 32 phases of the motion, spread evenly over it: these are its start phases. \
+The result is a table:
+  survival           share of the time that the agent lasts before it falls or is lost
+  success            share of the episodes in which it stays near the reference
+  body error         mean distance of its bodies from those of the reference; with
+                     the root subtracted, as if both stood in the same place
+  contact F1         how well its ground contacts agree with the reference's; 1 is best
+  foot skate         how fast its feet slide while they stand
+  root turned        how far its trunk turns in the whole motion, e.g. 6.28 rad for a
+                     somersault
+  normalised return  reward, as a share of the most that can be had
+  from rest          one more episode, which starts from standing still
+  missed             beside a value that is not good enough; with one such value, the
+                     motion is not yet learned
+A dash stands for what has no value, such as the error of a momentum that is zero.
 
 The run's own eval.json is written only with the default number of episodes and seconds, so that \
 runs can be compared by it.";
@@ -93,11 +111,24 @@ impl Args {
             }
         };
         let report = CaseEvaluation::json(&results);
+        let shown = || whole(&run, &results);
         match kept {
-            Ok(()) => printer.result(&report, || text(&results, None)),
-            Err(failure) => printer.partial_result(report, || text(&results, None), failure),
+            Ok(()) => printer.result(&report, shown),
+            Err(failure) => printer.partial_result(report, shown, failure),
         }
     }
+}
+
+/// Which run it is, how well it does, and how to watch it, as at the end of a training.
+fn whole(run: &Run, results: &[CaseEvaluation]) -> String {
+    let (name, folder) = (run.dir().display().to_string(), shell::path(run.dir()));
+    let watch = format!("watch it            {} replay {folder} --rerun", program());
+    format!(
+        "{}\n{}{}\n",
+        plain(&name),
+        text(results, None),
+        plain(&watch)
+    )
 }
 
 /// Where `--out` puts the result: never in place of a file that a run is made of, such as its own evaluation.

@@ -1,5 +1,6 @@
 //! `mimic plot`: draws the learning curves of runs.
 
+use crate::amount;
 use crate::args::Replace;
 use crate::failure::{Failure, Outcome};
 use crate::locate;
@@ -7,8 +8,9 @@ use crate::output::{self, Form, Maker, Output};
 use crate::plot::curves::{self, Curve, Panel, Scale};
 use crate::printer::Printer;
 use mimic::explain::plain;
+use mimic::file::Lock;
 use mimic::file::text_at_most;
-use mimic::run::files;
+use mimic::run::{Checkpoint, files};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
@@ -80,6 +82,8 @@ struct Log {
     folder: PathBuf,
     lines: Vec<Map<String, Value>>,
     evaluation: Option<Value>,
+    /// Samples of the checkpoint from which the run goes on, if it was stopped after that.
+    saved: Option<u64>,
 }
 
 impl Args {
@@ -142,6 +146,7 @@ impl Log {
             name: name.to_string_lossy().into_owned(),
             evaluation: evaluation(&folder.join(files::EVALUATION))?,
             folder: folder.to_owned(),
+            saved: saved(folder, &lines),
             lines,
         })
     }
@@ -170,6 +175,15 @@ impl Log {
         let values = values.filter(|values| !values.is_empty())?;
         Some(values.iter().sum::<f64>() / values.len() as f64)
     }
+}
+
+/// Samples of the checkpoint, if the log goes on after it and nobody trains the run.
+fn saved(folder: &Path, lines: &[Map<String, Value>]) -> Option<u64> {
+    let logged = lines.last()?.get("samples")?.as_u64()?;
+    let saved = Checkpoint::load(folder.join(files::CHECKPOINT))
+        .ok()?
+        .samples;
+    (saved < logged && Lock::holder(folder).is_none()).then_some(saved)
 }
 
 /// The evaluation of a run; an unfinished one has none.
@@ -278,8 +292,11 @@ fn summary(path: &Path, names: &[String], logs: &[Log]) -> String {
         let figure = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
+        let saved = log.saved.map_or_else(String::new, |saved| {
+            format!(" ({} of them saved)", amount::count(saved))
+        });
         text += &format!(
-            "  {}: {}, {:.2} M samples, normalised return {}, survival {}, local error {} mm\n",
+            "  {}: {}, {:.2} M samples{saved}, normalised return {}, survival {}, local error {} mm\n",
             plain(name),
             iterations(log.lines.len()),
             log.samples() / 1e6,

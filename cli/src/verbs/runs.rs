@@ -89,6 +89,7 @@ fn folders(wanted: Option<&Path>) -> Outcome<Vec<PathBuf>> {
     }
     match std::fs::read_dir(folder) {
         Ok(_) => Ok(locate::runs(folder)),
+        Err(_) if folder.is_file() => Err(locate::absent_run(folder)),
         Err(cause) if cause.kind() == NotFound => Err(locate::absent_run(folder)),
         Err(cause) => Err(Failure::unreadable(folder, &cause)),
     }
@@ -221,9 +222,10 @@ fn text(entries: &[Entry]) -> String {
 
 fn row(entry: &Entry) -> [String; 7] {
     let dash = || "-".to_owned();
+    // Samples come in iterations, so a run learns from a few more than it was told to.
     let samples = entry.samples.zip(entry.planned).map(|(done, planned)| {
-        let planned = amount::count(planned);
-        format!("{} of {planned}", amount::count(done))
+        let done = amount::count(done.min(planned));
+        format!("{done} of {}", amount::count(planned))
     });
     let ago = entry.learned.map(|time| {
         let seconds = time.elapsed().unwrap_or_default().as_secs_f64();

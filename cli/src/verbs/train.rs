@@ -14,6 +14,7 @@ use crate::locate;
 use crate::prepare::{Preparation, Prepared};
 use crate::printer::Printer;
 use crate::runs;
+use crate::shell;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clock::Clock;
 use finish::Stopped;
@@ -21,6 +22,7 @@ use mimic::run::{Claim, Plan, Run, RunError, Session, files};
 use mimic::task::{TASKS, TaskError};
 use preset::Preset;
 use progress::Progress;
+pub use resume::program;
 use resume::{farewell, unwritten};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -51,8 +53,12 @@ Presets (docs/settings.md lists all their values):
 
 A run folder holds config.json, metrics.jsonl, the checkpoint and the policy, and in the end also \
 eval.json and replay.rrd. No run is ever overwritten: the next one of the same clip is runs/kick-2. \
-Ctrl-C finishes the current round, saves and stops. A second Ctrl-C stops at once and keeps the last \
-checkpoint.";
+Training goes on in iterations, and after some of them (a round: 20 in the default preset) it saves a \
+checkpoint. Ctrl-C finishes the current round, saves and stops. A second Ctrl-C stops at once and keeps \
+the last checkpoint, from which `--resume` goes on.";
+
+/// The preset of who chooses none.
+const DEFAULT: &str = "default";
 
 /// Longest training, minutes: two years, which is longer than anybody trains and within what clocks can count.
 const MOST_MINUTES: f64 = 1e6;
@@ -69,7 +75,7 @@ pub struct Args {
     task: Option<String>,
     /// Settings to start from: `default`, `deepmimic`, `deepmimic2018`, `booth2020`, those of a run, or a JSON file with a
     /// plan as in a run's config.json
-    #[arg(long, value_name = "NAME|FILE|RUN", default_value = "default")]
+    #[arg(long, value_name = "NAME|FILE|RUN", default_value = DEFAULT)]
     preset: String,
     /// Change one setting of the preset, e.g. `ppo.gamma=0.97`; can be repeated
     #[arg(long, value_name = "PATH=VALUE")]
@@ -78,7 +84,8 @@ pub struct Args {
     /// usual ones (`task.perturbations` in docs/settings.md)
     #[arg(long)]
     perturb: bool,
-    /// Number of samples to learn from, e.g. 5M or 800k [default: that of the preset]
+    /// Number of samples to learn from, e.g. 5M or 800k, rounded up to whole iterations (4096 samples in the default preset)
+    /// [default: that of the preset]
     #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
     samples: Option<u64>,
     /// Stop after this many minutes, even if samples are left; preparing and measuring count as well
@@ -146,7 +153,9 @@ impl Args {
         let claim = self.claim(&preparations, printer)?;
         let mut motions = Vec::new();
         let mut skeleton = None;
+        say_repeated(&preparations, printer);
         let prepared = Preparation::run_all(&preparations, printer)?;
+        self.say_character(&preset, &preparations, &prepared, printer);
         for (preparation, prepared) in preparations.iter().zip(prepared) {
             let Prepared {
                 motion,
@@ -193,13 +202,38 @@ impl Args {
         Ok(files.into_iter().map(prepare).collect())
     }
 
+    /// A motion keeps the character that it was made for. Says so where the preset was chosen, and is for another one.
+    fn say_character(
+        &self,
+        preset: &Preset,
+        preparations: &[Preparation],
+        prepared: &[Prepared],
+        printer: &Printer,
+    ) {
+        let wanted = preset
+            .skeleton
+            .filter(|_| self.preset != DEFAULT && self.retarget.skeleton.is_none());
+        let own = preparations.iter().zip(prepared);
+        let other = own.into_iter().find_map(|(preparation, prepared)| {
+            let name = &prepared.skeleton.name;
+            let differs = wanted.filter(|wanted| preparation.is_motion() && wanted != name)?;
+            Some((preparation.file.display(), name, differs))
+        });
+        if let Some((file, own, wanted)) = other {
+            printer.warn(format!(
+                "`{file}` was made for the character `{own}`, which is trained, and the preset `{}` is for `{wanted}`; give the clip of this motion to train `{wanted}`",
+                self.preset
+            ));
+        }
+    }
+
     /// Claims the folder of the new run: that of `--out`, or a free one named after the inputs.
     fn claim(&self, preparations: &[Preparation], printer: &Printer) -> Outcome<Claim> {
         if let Some(out) = &self.out {
             return Claim::on(out).map_err(|error| match error {
                 RunError::Exists(_) => Failure::from(error).with_remedy(format!(
                     "choose another folder with `--out`, or continue that run with `--resume {}`",
-                    out.display()
+                    shell::path(out)
                 )),
                 _ => error.into(),
             });
@@ -244,6 +278,19 @@ impl Args {
         plan.samples = self.samples.unwrap_or(plan.samples);
         plan.seed = self.seed.unwrap_or(plan.seed);
         Ok(preset)
+    }
+}
+
+/// Says which file was given more than once: its motion then counts as often.
+fn say_repeated(preparations: &[Preparation], printer: &Printer) {
+    let place = |one: &Preparation| one.file.canonicalize().unwrap_or(one.file.clone());
+    let places: Vec<PathBuf> = preparations.iter().map(place).collect();
+    let again = (1..places.len()).find(|&at| places[..at].contains(&places[at]));
+    if let Some(at) = again {
+        printer.warn(format!(
+            "`{}` is given more than once, so the policy learns the same motion as often; leave it out where that is not meant",
+            preparations[at].file.display()
+        ));
     }
 }
 

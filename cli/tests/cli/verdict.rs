@@ -43,7 +43,11 @@ fn training_ends_with_a_verdict_and_what_is_good() {
         .collect();
     assert_eq!(
         table,
-        evaluated.lines().skip(1).collect::<Vec<_>>(),
+        evaluated
+            .lines()
+            .skip(2)
+            .take_while(|line| !line.starts_with("watch it"))
+            .collect::<Vec<_>>(),
         "one table"
     );
     assert!(
@@ -112,6 +116,18 @@ fn rows_that_miss_their_bound_are_marked_and_nothing_is_a_share_of_nothing() {
 }
 
 #[test]
+fn an_evaluation_names_its_run_and_how_to_watch_it() {
+    let bench = Workbench::with_run();
+    let shown = text(&bench, &["eval"]);
+    assert_eq!(shown.lines().next(), Some("runs/sway"));
+    let last = shown.lines().last().unwrap_or_default();
+    assert!(
+        last.starts_with("watch it") && last.ends_with(" replay runs/sway --rerun"),
+        "{last}"
+    );
+}
+
+#[test]
 fn several_motions_have_one_sentence() {
     let bench = Workbench::with_run();
     let line = ["train", "sway.txt", "sway.txt", "--preset", "tiny.json"];
@@ -143,7 +159,7 @@ fn a_run_that_was_cut_short_says_so_and_how_to_go_on() {
     ];
     let end = text(&bench, &line);
     let verdict = end.lines().nth(1).unwrap_or_default();
-    let cut = "stopped by `--minutes` after 32 of 3.2k samples, go on with `";
+    let cut = "stopped by `--minutes` after 32 of 3.2k samples; go on with `";
     assert!(
         verdict.contains(cut) && verdict.ends_with(" train --resume runs/sway`"),
         "{end}"

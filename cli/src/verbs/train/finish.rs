@@ -1,16 +1,17 @@
 //! The end of training: evaluation, recording, and how to watch the result.
 
-use super::resume::{program, unwritten};
+use super::resume::{again, program, unwritten};
 use crate::amount;
 use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::recording;
 use crate::runs;
+use crate::shell;
 use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
 use mimic::evaluate::Options;
 use mimic::explain::plain;
-use mimic::run::{CaseEvaluation, Iteration, Plan, Run, Session, files};
+use mimic::run::{CaseEvaluation, Iteration, PRESETS, Plan, Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -47,7 +48,9 @@ pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome
         Some(file) => how_to_look(run.dir(), &file),
         None => String::new(),
     };
-    let advice = advice(session, stopped, &results);
+    let more = [surplus(session), advice(session, stopped, &results)];
+    let more: Vec<String> = more.into_iter().flatten().collect();
+    let advice = Some(more.join("; ")).filter(|advice| !advice.is_empty());
     let table = eval::text(&results, advice.as_deref());
     printer.text(&format!("{folder}\n{table}{look}"))
 }
@@ -100,38 +103,73 @@ pub fn duration(session: &Session, iteration: &Iteration) -> Duration {
 
 /// What to do about a run that isn't learned, or not to its end.
 fn advice(session: &Session, stopped: Stopped, results: &[CaseEvaluation]) -> Option<String> {
-    let folder = plain(&session.run().dir().display().to_string());
-    let mimic = program();
-    let (samples, planned) = (
-        session.trainer().samples(),
-        session.trainer().settings().samples,
-    );
+    let planned = session.trainer().settings().samples;
     let learned = results.iter().all(|one| one.evaluation.verdict.learned);
     match stopped {
         Stopped::Samples if learned => None,
         Stopped::Samples => Some(format!(
             "train a new run with more samples, by the same command with `--samples {}`",
-            amount::count(planned.saturating_mul(2).max(Plan::default().samples))
+            amount::count(
+                planned
+                    .saturating_mul(2)
+                    .max(usual_samples(session.run().plan()))
+            )
         )),
         Stopped::Minutes | Stopped::Interrupt => {
-            let from = match session.can_be_saved() {
-                true => String::new(),
-                false => format!(
-                    ", which repeats the round that was cut short, from {} samples on",
-                    amount::count(saved(session))
+            let (saved, planned) = (amount::count(saved(session)), amount::count(planned));
+            let again = again(session.run());
+            Some(match session.can_be_saved() {
+                true => format!(
+                    "stopped by `--minutes` after {saved} of {planned} samples; go on with `{again}`"
                 ),
-            };
-            Some(format!(
-                "stopped by `--minutes` after {} of {} samples, go on with `{mimic} train --resume {folder}`{from}",
-                amount::count(samples),
-                amount::count(planned),
-            ))
+                false => format!(
+                    "stopped by `--minutes` between two checkpoints; `{again}` goes on from the last one, at {saved} of {planned} samples, and repeats what came after it"
+                ),
+            })
         }
     }
 }
 
+/// How many samples the preset has that a plan was most likely made of: the one with the same network and task, for single
+/// settings may have been changed.
+fn usual_samples(plan: &Plan) -> u64 {
+    let alike = |of: &Plan| {
+        let same = [
+            of.ppo == plan.ppo,
+            of.hidden == plan.hidden,
+            of.final_std == plan.final_std,
+            of.environments == plan.environments,
+            of.horizon == plan.horizon,
+        ];
+        let task = 2 * usize::from(of.task == plan.task);
+        task + same.into_iter().filter(|same| *same).count()
+    };
+    // Ours comes first, and is taken before others that are as much alike.
+    let plans = PRESETS.iter().rev().map(|preset| (preset.plan)());
+    let nearest = plans.max_by_key(alike);
+    nearest.map_or(0, |plan| plan.samples)
+}
+
+/// That a run learned from clearly more samples than it was told to, and why.
+fn surplus(session: &Session) -> Option<String> {
+    let (samples, settings) = (session.trainer().samples(), session.trainer().settings());
+    let each = (settings.environments * settings.horizon) as u64;
+    // A tenth more is nothing that anybody asks about.
+    (samples > settings.samples + settings.samples / 10).then(|| {
+        format!(
+            "it learned from {} samples, not {}, because samples come in iterations of {}",
+            amount::count(samples),
+            amount::count(settings.samples),
+            amount::count(each)
+        )
+    })
+}
+
 /// The samples of the last checkpoint: a run goes on from where it was saved, which is between rounds.
 fn saved(session: &Session) -> u64 {
+    if session.can_be_saved() {
+        return session.trainer().samples();
+    }
     let settings = session.trainer().settings();
     let each = (settings.environments * settings.horizon) as u64;
     let iteration = session.trainer().iteration();
@@ -142,20 +180,21 @@ fn saved(session: &Session) -> u64 {
 /// damaged again from the checkpoint.
 pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
     let run = session.run();
-    let folder = run.dir().display();
+    let folder = shell::path(run.dir());
     let is_there = |name: &str| run.dir().join(name).exists();
     let recorded = !recording::AVAILABLE || is_there(files::RECORDING);
     if is_there(files::EVALUATION) && recorded && session.has_policy() {
         let (samples, mimic) = (session.trainer().samples(), program());
         return Err(Failure::user(format!(
-            "the run `{folder}` is finished: it has learned from all its {samples} samples"
+            "the run `{}` is finished: it has learned from all its {samples} samples", run.dir().display()
         ))
         .with_remedy(format!(
             "evaluate it with `{mimic} eval {folder}`, or watch it with `{mimic} replay {folder} --rerun`"
         )));
     }
     printer.note(format!(
-        "the run `{folder}` has used up its samples; only some of its results are missing"
+        "the run `{}` has used up its samples; only some of its results are missing",
+        run.dir().display()
     ));
     // The policy follows from the checkpoint.
     session.save().map_err(|e| unwritten(run, e))?;
@@ -182,10 +221,11 @@ fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
 }
 
 fn how_to_look(folder: &Path, recording: &Path) -> String {
-    let shown = |path: &Path| plain(&path.display().to_string());
-    let (folder, recording, mimic) = (shown(folder), shown(recording), program());
+    let shown = plain(&recording.display().to_string());
+    let (folder, recording, mimic) = (shell::path(folder), shell::path(recording), program());
+    let (folder, recording) = (plain(&folder), plain(&recording));
     let mut text = format!(
-        "recording: {recording}\n  watch it          rerun {recording}\n  or from the run   {mimic} replay {folder} --rerun\n"
+        "recording: {shown}\n  watch it          rerun {recording}\n  or from the run   {mimic} replay {folder} --rerun\n"
     );
     if Viewer::find().is_none() {
         text += &format!("  rerun is not installed yet: {}\n", viewer::install());

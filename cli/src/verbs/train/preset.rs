@@ -42,8 +42,11 @@ impl Preset {
         let file = file(Path::new(name))?;
         let text = text_at_most(&file, MOST_BYTES).map_err(|e| Failure::unreadable(&file, &e))?;
         let plan = parse(&text).map_err(|e| {
-            Failure::input(&file, format!("this is not a training plan: {e}"))
-                .with_remedy("compare it with `plan` in the config.json of a run")
+            Failure::input(
+                &file,
+                format!("this is not a training plan: {}", setting::in_words(&e)),
+            )
+            .with_remedy("compare it with `plan` in the config.json of a run")
         })?;
         if plan.samples == 0 {
             return Err(Failure::input(&file, "the number of samples is 0")

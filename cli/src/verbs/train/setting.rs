@@ -38,8 +38,36 @@ pub fn change(plan: &Plan, change: &str) -> Outcome<Plan> {
         value => value.unwrap_or_else(|_| Value::from(text)),
     };
     serde_json::from_value(values).map_err(|e| {
-        wrong(e.to_string()).with_remedy(format!("give a value such as the present one, {old}"))
+        wrong(in_words(&e)).with_remedy(format!("give a value such as the present one, {old}"))
     })
+}
+
+/// What is wrong with a value, without the names of a programming language.
+pub fn in_words(error: &serde_json::Error) -> String {
+    let kinds = [
+        (&["f32", "f64"][..], "a number"),
+        (
+            &["u8", "u16", "u32", "u64", "usize"],
+            "a whole number from 0",
+        ),
+        (&["i8", "i16", "i32", "i64", "isize"], "a whole number"),
+        (&["sequence"], "list"),
+        (&["map"], "object"),
+    ];
+    let said = error.to_string();
+    let word = |word: &str| {
+        let bare = word.trim_end_matches([',', '.']);
+        let kind = kinds.iter().find(|(names, _)| names.contains(&bare));
+        kind.map_or_else(|| word.to_owned(), |(_, kind)| word.replace(bare, kind))
+    };
+    // Only what is expected: what was found is the caller's own.
+    match said.split_once("expected ") {
+        Some((found, expected)) => {
+            let expected: Vec<String> = expected.split(' ').map(word).collect();
+            format!("{found}expected {}", expected.join(" "))
+        }
+        None => said,
+    }
 }
 
 /// The paths of all settings of a plan, without groups of settings.
@@ -120,6 +148,15 @@ mod tests {
         assert!(said("task.termination.distance=1").contains("`task.terminations.distance`"));
         assert!(said("gama=1").contains("`ppo.gamma`"));
         assert!(said("ppo.gamma=high").ends_with("the present one, 0.95"));
+        for (wrong, expected) in [
+            ("ppo.gamma=high", "expected a number;"),
+            ("samples=many", "expected a whole number from 0;"),
+            ("samples=-1", "expected a whole number from 0;"),
+            ("environments=1.5", "expected a whole number from 0;"),
+            ("hidden=8", "expected a list;"),
+        ] {
+            assert!(said(wrong).contains(expected), "{wrong}: {}", said(wrong));
+        }
         assert!(said("task.actions.kind=absolute").contains("reach"));
         assert!(said("gamma").contains("ppo.gamma=0.99"));
         assert!(said(r#"task.rewards={"pose": 1"#).contains("not JSON: EOF"));

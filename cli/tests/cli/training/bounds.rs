@@ -67,7 +67,7 @@ fn numbers_out_of_range_are_wrong_usage() {
 }
 
 #[test]
-fn a_run_that_cannot_be_written_is_failed_work() {
+fn a_run_that_cannot_be_written_says_what_to_do_and_how_to_go_on() {
     let bench = with_preset();
     let cut = ["--samples", "2560", "--minutes", "1e-9"];
     bench.mimic(&[&SMALL[..], &cut].concat()).assert().success();
@@ -75,8 +75,9 @@ fn a_run_that_cannot_be_written_is_failed_work() {
     std::fs::remove_file(&policy).expect("it was saved");
     std::fs::create_dir(&policy).expect("a folder can be made");
     let resume = ["train", "--resume", "run"];
-    let said = bench.complaint(&resume, 1);
+    let said = bench.complaint(&resume, 2);
     assert!(said.contains("policy.safetensors"), "{said}");
+    assert!(said.contains("move it away"), "{said}");
     assert!(said.contains("train --resume run"), "{said}");
     std::fs::remove_dir(&policy).expect("it is empty");
     bench.mimic(&resume).assert().success();
