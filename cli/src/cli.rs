@@ -21,9 +21,10 @@ Examples:
   mimic eval kick                  measure how well the agent performs
   mimic plot kick                  draw how it learned
 
-Every command accepts the file of an earlier stage and does the missing steps itself: \
-`mimic train kick.fbx` imports and retargets first. An input is a path, or a name in the library \
-folder or in runs/. Without an input, commands use the newest file or run.
+`retarget`, `tracks`, `train` and `replay` accept the file of any earlier stage and do the missing \
+steps themselves: `mimic train kick.fbx` imports and retargets first. An input is a path, a name in \
+the library folder, or the name of a run in runs/. Without an input, `retarget` uses the newest clip, \
+`tracks` and `train` use the newest motion, and `eval`, `replay` and `plot` the newest run.
 
 Results go to standard output, messages to standard error. Exit codes: 0 success, 1 the work failed, \
 2 wrong usage or input.";
@@ -76,7 +77,8 @@ pub fn parse() -> Result<Cli, ExitCode> {
         }
         let arguments: Vec<_> = std::env::args_os().collect();
         other_names::explain(&mut error, &Cli::command(), &arguments);
-        let failure = usage(&error.render().to_string(), &arguments);
+        let failure = other_names::fixed(&error)
+            .unwrap_or_else(|| usage(&error.render().to_string(), &arguments));
         printer::usage_error(&failure);
         if wants_json() {
             printer::json_error(&failure);
