@@ -228,7 +228,7 @@ pub fn address(place: &str) -> String {
     }
 }
 
-/// Fails where no viewer listens at `address`: sending would wait for one for ever.
+/// Fails where no viewer answers at `address`: sending would wait for one for ever.
 pub fn reach(address: &str) -> Outcome {
     let place = address.split("://").last().unwrap_or_default();
     let place = place.split('/').next().unwrap_or_default();
@@ -236,11 +236,15 @@ pub fn reach(address: &str) -> Outcome {
         Failure::user(format!("`{address}` is not the address of a viewer ({e})"))
             .with_remedy("give one as host:port")
     })?;
-    if found.into_iter().any(answers) {
+    let found: Vec<SocketAddr> = found.collect();
+    if found.iter().any(|place| place::is_viewer(*place)) {
         return Ok(());
     }
-    Err(Failure::work(format!("no viewer listens at `{place}`"))
-        .with_remedy("start one with `rerun`"))
+    let cause = match found.into_iter().any(answers) {
+        true => format!("what listens at `{place}` does not answer as a viewer"),
+        false => format!("no viewer listens at `{place}`"),
+    };
+    Err(Failure::work(cause).with_remedy("start a viewer with `rerun`, or name its address"))
 }
 
 /// How to get the viewer.

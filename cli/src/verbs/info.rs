@@ -74,7 +74,8 @@ impl Args {
         let map = match humanoid::map(&joints) {
             Ok(map) => map,
             Err(e) => {
-                report.problems.push(not_humanoid(&e));
+                // First, for a file may have hundreds of others.
+                report.problems.insert(0, not_humanoid(&e));
                 humanoid::partial(&joints)
             }
         };
@@ -90,9 +91,12 @@ impl Args {
     }
 }
 
+/// Id of the problem that a figure can't be retargeted without a joint map.
+const NOT_HUMANOID: &str = "not-humanoid";
+
 fn not_humanoid(reason: &humanoid::Error) -> Problem {
     Problem {
-        id: "not-humanoid".into(),
+        id: NOT_HUMANOID.into(),
         severity: Severity::Warning,
         message: reason.to_string(),
     }
@@ -226,7 +230,15 @@ fn text(report: &Report) -> String {
         "takes",
         takes.map(|(at, take)| take_line(at + 1, take, several)),
     );
-    section(&mut text, "joint map", report.map.iter().map(map_line));
+    let is_humanoid = report
+        .problems
+        .iter()
+        .all(|problem| problem.id != NOT_HUMANOID);
+    let title = match is_humanoid || report.map.is_empty() {
+        true => "joint map",
+        false => "joint map, which is not that of a humanoid: see the first problem",
+    };
+    section(&mut text, title, report.map.iter().map(map_line));
     section(
         &mut text,
         "problems",

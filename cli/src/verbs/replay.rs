@@ -113,7 +113,7 @@ struct Sinks {
     /// Send it to a running viewer, e.g. at 127.0.0.1:9876
     #[arg(long, value_name = "ADDR", value_parser = NonEmptyStringValueParser::new())]
     connect: Option<String>,
-    /// Serve it to web browsers until Ctrl-C
+    /// Serve it to web browsers until Ctrl-C; the rerun viewer has to be installed for that, too
     #[arg(long)]
     serve: bool,
     /// Address at which the viewer of `--serve` or `--rerun` listens, with a port if it has to be a certain one: 0.0.0.0 lets
@@ -331,8 +331,8 @@ impl Sinks {
     /// Refuses a replay that nobody would see, and an address at which nothing listens.
     fn check(&self) -> Outcome {
         if !(self.rerun || self.serve || self.connect.is_some() || self.save.is_some()) {
-            return Err(Failure::user("it is not said where to show the replay").with_remedy(
-                "open it in the viewer with `--rerun`, in a browser with `--serve`, or write it to a file with `--save FILE.rrd`",
+            return Err(Failure::user("the command does not say where to show the replay").with_remedy(
+                "say it: `--rerun` opens the viewer, `--serve` a browser's page in the viewer, and `--save FILE.rrd` writes a file",
             ));
         }
         if self.bind.is_some() && !(self.rerun || self.serve) {
