@@ -43,7 +43,8 @@ pub struct ImportArgs {
     /// Take to read, by name or by number from 1; `mimic import` also accepts `all` [default: the take with most motion]
     #[arg(long, value_name = "TAKE", value_parser = NonEmptyStringValueParser::new())]
     take: Option<String>,
-    /// Frames per second to sample at; below 27, a motion is sampled at a multiple of it [default: the take's own rate]
+    /// Frames per second of the clip. A motion made of a clip with fewer than 27 gets more, by a whole factor: a clip with 20
+    /// becomes a motion with 60 [default: the take's own rate]
     #[arg(long, value_name = "HZ", value_parser = frame_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Part of the take to keep, in seconds from its start, e.g. 0.5..2, 1.. or ..2

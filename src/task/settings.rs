@@ -19,8 +19,8 @@ pub const TASKS: [(&str, &str); 1] = [(
     "perform the motion, guided by its phase (the default)",
 )];
 
-/// The settings of one task. In JSON an object with the task's own settings and its name as `kind`; without a name it is
-/// `imitate`, the only task of earlier versions.
+/// The settings of one task. In JSON an object with the task's own settings and its name as `kind`. An object
+/// without `kind` is of the task `imitate`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 #[non_exhaustive]

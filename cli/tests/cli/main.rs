@@ -20,6 +20,7 @@ mod shown;
 mod spared;
 mod stages;
 mod talk;
+mod told;
 mod training;
 mod verdict;
 mod workbench;
