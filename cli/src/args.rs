@@ -139,6 +139,14 @@ impl RetargetArgs {
         Err(Failure::input(file, cause).with_remedy("give the clip, or leave the options out"))
     }
 
+    /// What tells a result for this character from one for another; that of the usual one is `name` alone.
+    pub fn detail(&self, name: &str) -> String {
+        match self.skeleton.as_deref() {
+            None | Some("humanoid") => name.to_owned(),
+            Some(other) => format!("{name} on {other}"),
+        }
+    }
+
     /// The physics character that was asked for.
     pub fn skeleton(&self) -> Outcome<Skeleton> {
         let name = self.skeleton.as_deref().unwrap_or("humanoid");

@@ -222,7 +222,12 @@ impl Args {
 
     /// The file of `--save`.
     fn output(&self, path: PathBuf, source: &Source) -> Output {
-        let maker = Maker::new("replay", [source.path()]).with(self.import.take().unwrap_or(""));
+        let detail = self.retarget.detail(self.import.take().unwrap_or(""));
+        let maker = Maker::new("replay", [source.path()]).with(detail);
+        let maker = match source {
+            Source::Run(_) => maker,
+            Source::Animation(_) => maker.by(" for the same character and take"),
+        };
         Output::new(path, Form::Recording, maker, "--save", self.replace.force)
     }
 
@@ -350,8 +355,9 @@ impl Sinks {
 fn send(shown: &Recording, address: String) -> Outcome {
     viewer::reach(&address)?;
     let failed = |e| {
-        Failure::work(format!("cannot send the recording to `{address}`: {e}"))
-            .with_remedy("check that the viewer still runs, or write it to a file with `--save`")
+        Failure::work(format!("cannot send the recording to `{address}`: {e}")).with_remedy(
+            "check that the viewer still runs, or write it to a file with `--save FILE.rrd`",
+        )
     };
     recording::send(shown, &address).map_err(failed)
 }

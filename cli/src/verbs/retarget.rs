@@ -53,11 +53,7 @@ impl Args {
         let name = preparation.name();
         let path = result_path(self.out.as_deref(), &name, Form::Motion);
         // A motion of another character is another motion.
-        let detail = match self.retarget.skeleton.as_deref() {
-            None | Some("humanoid") => name,
-            Some(other) => format!("{name} on {other}"),
-        };
-        let maker = Maker::new("retarget", [&file]).with(detail);
+        let maker = Maker::new("retarget", [&file]).with(self.retarget.detail(&name));
         let maker = maker.by(" for the same character and take");
         let output = Output::new(path, Form::Motion, maker, "--out", self.replace.force);
         output.check()?;

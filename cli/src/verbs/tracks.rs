@@ -96,7 +96,9 @@ impl Args {
         form: Form,
         source: &Preparation,
     ) -> Option<Output> {
-        let maker = Maker::new("tracks", [&source.file]).with(source.name());
+        let detail = self.retarget.detail(&source.name());
+        let maker = Maker::new("tracks", [&source.file]).with(detail);
+        let maker = maker.by(" for the same character and take");
         let path = path?.to_owned();
         Some(Output::new(path, form, maker, flag, self.replace.force))
     }

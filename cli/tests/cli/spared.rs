@@ -400,6 +400,18 @@ fn what_differs_is_said() {
             "`mimic retarget` made from `sway.txt` for the same character and take;",
         ),
         (
+            &["tracks", "sway.txt", "--plot", "tracks.svg"],
+            &[
+                "tracks",
+                "sway.txt",
+                "--plot",
+                "tracks.svg",
+                "--skeleton",
+                "robot",
+            ],
+            "`mimic tracks` made from `sway.txt` for the same character and take;",
+        ),
+        (
             &["plot", "sway", "--out", "a.svg"],
             &["plot", "sway", "runs/sway", "--out", "a.svg"],
             "`mimic plot` made from `runs/sway` and `runs/sway`;",
@@ -407,7 +419,7 @@ fn what_differs_is_said() {
         (
             &["plot", "sway"],
             &["tracks", "sway.txt", "--plot", "sway.svg"],
-            "`mimic tracks` made from `sway.txt`;",
+            "`mimic tracks` made from `sway.txt` for the same character and take;",
         ),
     ] {
         bench.mimic(first).assert().success();
