@@ -182,7 +182,7 @@ impl Viewer {
     fn ended(&self, status: ExitStatus) -> Failure {
         let path = self.path.display();
         Failure::work(format!("the viewer `{path}` ended with {status}")).with_remedy(
-            "start it by itself to see why, or write the recording to a file with `--save`",
+            "start it by itself to see why, or write the recording to a file with `--save FILE.rrd`",
         )
     }
 
@@ -191,7 +191,7 @@ impl Viewer {
             "cannot start the viewer `{}`: {cause}",
             self.path.display()
         ))
-        .with_remedy("write the recording to a file with `--save`")
+        .with_remedy("write the recording to a file with `--save FILE.rrd`")
     }
 }
 

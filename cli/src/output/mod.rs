@@ -176,7 +176,11 @@ impl Output {
     }
 
     fn elsewhere(&self) -> String {
-        format!("write to another file with {}", self.flag_in_ticks())
+        let extension = self.form.extension();
+        format!(
+            "write to another file with `{} FILE.{extension}`",
+            self.flag
+        )
     }
 
     fn flag_in_ticks(&self) -> String {
@@ -193,7 +197,9 @@ fn is_taken(path: &Path) -> bool {
 pub fn make_folder(folder: &Path) -> Outcome {
     if folder.is_file() {
         let cause = "this is a file, and the result needs a folder";
-        return Err(Failure::input(folder, cause).with_remedy("name another folder with `--out`"));
+        return Err(
+            Failure::input(folder, cause).with_remedy("name another folder with `--out FOLDER/`")
+        );
     }
     std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))
 }

@@ -128,7 +128,7 @@ fn folder() -> Check {
         },
         remedy: written
             .is_err()
-            .then(|| "work in a folder of your own, or name one with `--out`".into()),
+            .then(|| "work in a folder of your own, or name one with `--out PATH`".into()),
     }
 }
 

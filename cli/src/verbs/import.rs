@@ -57,11 +57,14 @@ impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let steps = self.plan(library)?;
         let bar = printer.progress(steps.len() as u64, "{bar:30} {pos}/{len} {msg}");
-        let (mut reports, mut failures) = (Vec::new(), Vec::new());
+        let (mut reports, mut read, mut failures) = (Vec::new(), Vec::new(), Vec::new());
         for step in &steps {
             bar.set_message(plain(&step.input.display().to_string()));
             match self.import(step, printer) {
-                Ok(report) => reports.push(report),
+                Ok(report) => {
+                    reports.push(report);
+                    read.push(step.input.display().to_string());
+                }
                 Err(failure) => failures.push((step.input.as_path(), failure)),
             }
             bar.inc(1);
@@ -69,9 +72,9 @@ impl Args {
         bar.finish_and_clear();
         let files = reports.iter().map(|report| report.file().to_owned());
         let problems = reports.iter().map(ClipReport::problems);
-        let found: Vec<_> = files.zip(problems).collect();
-        printer.choices(&found);
-        printer.problems_of(&found);
+        let sources = read.into_iter().zip(problems.clone());
+        printer.choices(&sources.collect::<Vec<_>>());
+        printer.problems_of(&files.zip(problems).collect::<Vec<_>>());
         if let ([_], false) = (&steps[..], self.wants_all()) {
             failures.pop().map_or(Ok(()), |(_, failure)| Err(failure))?;
             return reports
@@ -103,8 +106,9 @@ impl Args {
                     let (other, output) = (other.display(), path.display());
                     let cause =
                         format!("its clip would be `{output}`, and so would that of `{other}`");
-                    return Err(Failure::input(&input, cause)
-                        .with_remedy("import the two into different folders (`--out`)"));
+                    return Err(Failure::input(&input, cause).with_remedy(
+                        "import it by itself, into another folder with `--out FOLDER/`",
+                    ));
                 }
                 let maker = Maker::new("import", [&input])
                     .with(&name)

@@ -23,7 +23,9 @@ Examples:
 
 A run is `training` while a process writes it, `finished` once it has learned from all its samples \
 and was measured, `stopped` before that (`mimic train --resume RUN` goes on), and `broken` if its \
-files cannot be read. Survival is that of its last evaluation, averaged over its clips.";
+files cannot be read. Survival is that of its last evaluation, averaged over its clips. Samples are those from which \
+`--resume` goes on, and at most the planned number: a run learns in whole iterations, so it may have \
+learned from a few more.";
 
 /// List training runs: what they learn, how far they are, how well they do
 #[derive(clap::Args)]

@@ -232,7 +232,7 @@ impl Args {
         if let Some(out) = &self.out {
             return Claim::on(out).map_err(|error| match error {
                 RunError::Exists(_) => Failure::from(error).with_remedy(format!(
-                    "choose another folder with `--out`, or continue that run with `--resume {}`",
+                    "choose another folder with `--out FOLDER`, or continue that run with `--resume {}`",
                     shell::path(out)
                 )),
                 _ => error.into(),

@@ -80,13 +80,15 @@ impl Bind {
             io::ErrorKind::AddrInUse => Failure::user(format!(
                 "another program listens at `{place}` already"
             ))
-            .with_remedy("name another port with `--bind`, or leave the port out for a free one"),
+            .with_remedy(
+                "name another port with `--bind ADDR:PORT`, or leave the port out for a free one",
+            ),
             io::ErrorKind::AddrNotAvailable => {
                 Failure::user(format!("`{}` is not an address of this machine", self.ip))
-                    .with_remedy("give one that is with `--bind`, or 0.0.0.0 for all")
+                    .with_remedy("give one that is with `--bind ADDR`, or 0.0.0.0 for all")
             }
             _ => Failure::work(format!("nothing can listen at `{place}` ({error})"))
-                .with_remedy("name another address or port with `--bind`"),
+                .with_remedy("name another address or port with `--bind ADDR:PORT`"),
         }
     }
 

@@ -398,7 +398,10 @@ fn a_port_that_is_taken_is_named() {
             .expect("it runs");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(&place) && said.contains("`--bind`"), "{said}");
+        assert!(
+            said.contains(&place) && said.contains("`--bind ADDR:PORT`"),
+            "{said}"
+        );
     }
     for (bind, reason) in [
         ("203.0.113.77", "is not an address of this machine"),

@@ -71,7 +71,7 @@ fn the_take_that_was_chosen_is_said_once() {
     let line = ["import", "two.gltf"];
     let note = said(&bench, &line);
     assert!(
-        note.starts_with("note: ") && note.contains("chose take `up`"),
+        note.starts_with("note: `two.gltf`: ") && note.contains("chose take `up`"),
         "{note}"
     );
     assert!(note.contains("(`--take TAKE`)"), "{note}");
