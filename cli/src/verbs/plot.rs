@@ -12,6 +12,7 @@ use mimic::file::Lock;
 use mimic::file::text_at_most;
 use mimic::run::{Checkpoint, files};
 use serde_json::{Map, Value, json};
+use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -120,8 +121,13 @@ impl Args {
 impl Log {
     fn read(folder: &Path) -> Outcome<Self> {
         let path = folder.join(files::METRICS);
-        let text = text_at_most(&path, MOST_BYTES)
-            .map_err(|e| Failure::unreadable(&path, &e).with_remedy("train the run first"))?;
+        let text = text_at_most(&path, MOST_BYTES).map_err(|e| {
+            let failure = Failure::unreadable(&path, &e);
+            match e.kind() {
+                NotFound => failure.with_remedy("train the run first"),
+                _ => failure,
+            }
+        })?;
         let mut lines = Vec::new();
         // The last line has no end while it is being written.
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);

@@ -479,6 +479,13 @@ fn what_is_in_the_way_of_a_runs_files_is_told() {
                 code => assert_eq!(code, Some(2), "{file}, link {link}: {said}"),
             }
             assert!(said.contains(file) && said.contains("; "), "{said}");
+            if file == "metrics.jsonl" {
+                let said = bench.complaint(&["plot", "sway"], 2);
+                assert!(
+                    said.contains(file) && !said.contains("train the run"),
+                    "{said}"
+                );
+            }
         }
     }
 }
