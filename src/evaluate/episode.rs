@@ -53,7 +53,7 @@ pub fn perform<A: Agent>(
         for (running, step) in running.into_iter().zip(steps) {
             running.outcome = step.outcome;
             let environment = running.environment.as_ref();
-            keep(&mut running.episode, task.as_ref(), environment, &step);
+            keep(&mut running.episode, environment, &step);
         }
     }
 }
@@ -82,8 +82,8 @@ impl Running {
     }
 }
 
-fn keep(episode: &mut Episode, task: &dyn Task, environment: &dyn Environment, step: &Step) {
-    episode.keep(frame(task, environment, step), step.outcome);
+fn keep(episode: &mut Episode, environment: &dyn Environment, step: &Step) {
+    episode.keep(frame(environment, step), step.outcome);
 }
 
 /// Performs the cases of these numbers one after the other in one episode: each for `seconds` or to its end, and each from
@@ -107,7 +107,7 @@ pub fn perform_sequence<A: Agent>(
     let mut advance = |environment: &mut dyn Environment, episode: &mut Episode| {
         let action = agent.act(environment, &mut memory)?;
         let step = step(environment, action);
-        keep(episode, task.as_ref(), environment, &step);
+        keep(episode, environment, &step);
         Ok::<bool, EvaluateError>(episode.failure.is_some())
     };
     for (part, &number) in cases.iter().enumerate() {

@@ -70,7 +70,7 @@ pub struct PpoConfig {
     /// Normalised advantages are limited to ± this. `null` sets no limit.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub advantage_limit: Option<f64>,
-    /// Learning rate of the critic at the start. `null` gives it the actor's.
+    /// Learning rate of the critic at the start. `null` gives it `learning_rate`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub critic_learning_rate: Option<f64>,
     /// Momentum of plain gradient descent, which then replaces Adam. `null` is Adam.
@@ -99,14 +99,14 @@ impl Default for PpoConfig {
             max_gradient_norm: 1.0,
             learning_rate: 3e-4,
             min_learning_rate: 1e-5,
-            max_learning_rate: 1e-2,
+            max_learning_rate: 1e-3,
             target_kl: Some(0.05),
             stop_kl_factor: 3.0,
             initial_std: 0.5,
             learn_std: false,
             normalize_returns: true,
             advantage_limit: None,
-            critic_learning_rate: None,
+            critic_learning_rate: Some(1e-3),
             momentum: None,
             adam: AdamConfig::default(),
         }
@@ -131,6 +131,11 @@ impl PpoConfig {
             }));
         }
         Ok(())
+    }
+
+    /// The largest learning rate that `target_kl` may set when rates have come down to this share.
+    pub(super) fn largest_rate(&self, share: f64) -> f64 {
+        (self.max_learning_rate * share).max(self.min_learning_rate)
     }
 
     /// What the loss is made of.

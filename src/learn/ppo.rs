@@ -42,6 +42,10 @@ pub struct Learner<T> {
     piece_norms: Vec<f64>,
     advantages: Vec<T>,
     targets: Vec<T>,
+    /// Parameters before the last step, so that one that went too far can be taken back.
+    before: Vec<T>,
+    /// Share of their learning rates that the critic has now, and that the actor may have at most.
+    anneal: f64,
 }
 
 impl<T: Scalar> Learner<T> {
@@ -70,6 +74,8 @@ impl<T: Scalar> Learner<T> {
             piece_norms: Vec::new(),
             advantages: Vec::new(),
             targets: Vec::new(),
+            before: Vec::new(),
+            anneal: 1.0,
             config,
             policy,
             state,
@@ -125,9 +131,15 @@ impl<T: Scalar> Learner<T> {
         self.state.parameters[range].fill(T::from_f64(std.ln()));
     }
 
-    /// Sets the learning rate, for one that follows a schedule.
-    pub fn set_learning_rate(&mut self, rate: f64) {
-        self.state.learning_rate = rate;
+    /// Sets the share of their learning rates at the start that actor and critic have now. Where a KL divergence steers the actor's,
+    /// it is the share of the largest rate that the actor may have.
+    pub fn anneal(&mut self, share: f64) {
+        self.anneal = share;
+        let rate = &mut self.state.learning_rate;
+        *rate = match self.config.target_kl {
+            Some(_) => rate.min(self.config.largest_rate(share)),
+            None => self.config.learning_rate * share,
+        };
     }
 
     /// Learns from a batch; `rng` shuffles it. Runs on the current rayon pool with the same bits at any size of it.
@@ -152,15 +164,17 @@ impl<T: Scalar> Learner<T> {
                     return Err(LearnError::Diverged { epoch, minibatch });
                 }
                 if self.exceeds_kl_limit(terms.approx_kl) {
+                    self.take_back();
                     totals.stop(terms.approx_kl);
                     break 'epochs;
                 }
                 totals.record(terms, norm);
+                self.before.clone_from(&self.state.parameters);
                 self.step(norm);
             }
         }
         let stats = self.summary(&totals, batch);
-        self.adapt_learning_rate(stats.approx_kl);
+        self.adapt_learning_rate(totals.attempted_kl());
         Ok(stats)
     }
 
@@ -199,6 +213,14 @@ impl<T: Scalar> Learner<T> {
         self.config
             .target_kl
             .is_some_and(|target| kl > self.config.stop_kl_factor * target)
+    }
+
+    /// Takes the last step back, which led the policy too far; the critic keeps what it learned in it.
+    fn take_back(&mut self) {
+        let actor = ..self.policy.critic_range().start;
+        if let Some(before) = self.before.get(actor) {
+            self.state.parameters[actor].copy_from_slice(before);
+        }
     }
 
     /// Before targets are computed, so that these samples are already learned on the new scale.
@@ -295,10 +317,8 @@ impl<T: Scalar> Learner<T> {
     /// Takes one gradient step; `norm` is that of the gradient.
     fn step(&mut self, norm: f64) {
         let (config, rate) = (&self.config, self.state.learning_rate);
-        // Where the actor's rate moves, the critic's moves with it.
-        let critic = config
-            .critic_learning_rate
-            .map_or(rate, |critic| critic * (rate / config.learning_rate));
+        // A KL divergence says how far the actor may go, and nothing of the critic.
+        let critic = config.critic_learning_rate.unwrap_or(config.learning_rate) * self.anneal;
         let rule = Rule {
             adam: config.adam,
             momentum: config.momentum,
@@ -341,7 +361,7 @@ impl<T: Scalar> Learner<T> {
         if kl > 2.0 * target {
             *rate = (*rate / 1.5).max(self.config.min_learning_rate);
         } else if kl < 0.5 * target {
-            *rate = (*rate * 1.5).min(self.config.max_learning_rate);
+            *rate = (*rate * 1.5).min(self.config.largest_rate(self.anneal));
         }
     }
 }

@@ -38,8 +38,8 @@ pub struct TrainerSettings {
     /// Action noise at the end, as a share of that at the start. It changes evenly over the samples.
     #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0))]
     pub final_std: f64,
-    /// Learning rate at the end, as a share of that at the start, where `ppo.target_kl` doesn't steer it. It changes evenly over
-    /// the samples.
+    /// Learning rates at the end, as a share of those at the start. They change evenly over the samples. Where `ppo.target_kl`
+    /// steers the actor's, it is the largest that it may set, `ppo.max_learning_rate`, that changes.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub final_learning_rate: f64,
 }

@@ -14,8 +14,8 @@ pub struct UpdateStats {
     pub value_loss: f64,
     /// Squared excess of mean actions over their bound, before its coefficient.
     pub action_bound_loss: f64,
-    /// KL divergence of the new policy from the old, nats: the mean over the last epoch, or that of the last minibatch if it
-    /// stopped the update.
+    /// KL divergence of the new policy from the old, nats: the mean over the last epoch, or, where a step led too far and was
+    /// taken back, that of the minibatch before it.
     pub approx_kl: f64,
     /// Share of samples whose probability ratio left 1 ± ε.
     pub clip_fraction: f64,
@@ -43,6 +43,8 @@ pub(super) struct UpdateTotals {
     /// KL divergences of the present epoch's minibatches.
     pub(super) epoch_kl: f64,
     pub(super) epoch_steps: usize,
+    /// KL divergence of the last minibatch that was learned from.
+    pub(super) last_kl: f64,
     /// KL divergence of the minibatch that ended the update early.
     pub(super) stopped: Option<f64>,
 }
@@ -57,6 +59,7 @@ impl UpdateTotals {
         self.terms += terms;
         self.norms += norm;
         self.steps += 1;
+        self.last_kl = terms.approx_kl;
         self.epoch_kl += terms.approx_kl;
         self.epoch_steps += 1;
     }
@@ -65,9 +68,17 @@ impl UpdateTotals {
         self.stopped = Some(kl);
     }
 
+    /// How far the policy was led.
     pub(super) fn kl(&self) -> f64 {
-        self.stopped
-            .unwrap_or(self.epoch_kl / self.epoch_steps.max(1) as f64)
+        match self.stopped {
+            Some(_) => self.last_kl,
+            None => self.epoch_kl / self.epoch_steps.max(1) as f64,
+        }
+    }
+
+    /// How far it would have been led without a step that was taken back.
+    pub(super) fn attempted_kl(&self) -> f64 {
+        self.stopped.unwrap_or_else(|| self.kl())
     }
 }
 

@@ -217,14 +217,10 @@ impl Trainer {
         (self.samples() as f64 / self.settings.samples.max(1) as f64).min(1.0)
     }
 
-    /// Where no KL divergence sets the learning rate, it changes evenly over the samples.
+    /// Learning rates come down evenly over the samples.
     fn schedule_rate(&mut self) {
-        if self.settings.ppo.target_kl.is_some() {
-            return;
-        }
         let share = 1.0 + (self.settings.final_learning_rate - 1.0) * self.done();
-        self.learner
-            .set_learning_rate(self.settings.ppo.learning_rate * share);
+        self.learner.anneal(share);
     }
 
     /// Standard deviation of the action noise in this iteration. Where it isn't learned, it changes evenly over the samples.

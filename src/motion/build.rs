@@ -1,11 +1,15 @@
 //! A motion with all its tracks, from coordinates alone.
 
+use super::carry::{Carried, twists};
 use super::timeline::Timeline;
 use super::wrench::{Standing, Support};
 use super::{Cycle, Motion, MotionError, Tracks, contact, momentum, phase, velocity, wrench};
 use crate::clip::LoopMode;
 use crate::skeleton::Skeleton;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
+
+/// Height of a body's lowest point up to which it touches the ground, leg lengths. Chosen: 1 cm with legs of 0.8 m.
+const TOUCHING: f64 = 0.0125;
 
 /// What a motion is made from: coordinates and what they don't say themselves.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,10 +24,10 @@ pub struct Draft {
     pub cycle: Cycle,
     /// `qpos[f]`: coordinates of every frame in MuJoCo's order, as long as the skeleton's `nq`.
     pub qpos: Vec<Vec<f64>>,
-    /// Indices of the bodies that may stand on the ground.
+    /// Indices of the bodies that may touch the ground: [`Skeleton::contact_bodies`], or none for a motion without a ground.
     pub contact_bodies: Vec<usize>,
     /// `contact[f][c]`: whether each contact body stands. If it is `None`, that is found from the poses, with the ground at
-    /// z = 0.
+    /// z = 0. What carries the motion without standing still is found besides.
     pub contact: Option<Vec<Vec<bool>>>,
 }
 
@@ -42,41 +46,7 @@ impl Motion {
         let qvel = velocity::qvel(skeleton, &draft.qpos, draft.fps, &timeline);
         let bodies: Vec<_> = draft.qpos.iter().map(|q| skeleton.forward(q)).collect();
         let whole = momentum::whole_body(skeleton, &draft.qpos, &qvel, &bodies);
-        let contact = draft
-            .contact
-            .clone()
-            .unwrap_or_else(|| contacts(skeleton, &bodies, &draft));
-        let required = wrench::required(
-            &whole.com,
-            &whole.angular_momentum,
-            skeleton.total_mass(),
-            draft.fps,
-            &timeline,
-        );
-        let support = Support {
-            skeleton,
-            leg: skeleton.leg_length(),
-            bodies: &bodies,
-            com: &whole.com,
-            required: &required,
-            standing: Standing {
-                bodies: &draft.contact_bodies,
-                contact: &contact,
-            },
-            fps: draft.fps,
-            timeline: &timeline,
-        };
-        let residual = (0..bodies.len()).map(|f| support.residual(f)).collect();
-        let tracks = Tracks {
-            phase: phase::phase(draft.qpos.len()),
-            com: whole.com,
-            com_velocity: whole.com_velocity,
-            linear_momentum: whole.linear_momentum,
-            angular_momentum: whole.angular_momentum,
-            contact,
-            root_wrench_residual: residual,
-        };
-        Self {
+        let mut motion = Self {
             name: draft.name,
             fps: draft.fps,
             loop_mode: draft.loop_mode,
@@ -85,13 +55,94 @@ impl Motion {
             skeleton_sha256: skeleton.sha256.clone(),
             body_names: skeleton.bodies.iter().map(|b| b.name.clone()).collect(),
             contact_bodies: draft.contact_bodies,
+            tracks: Tracks {
+                phase: phase::phase(draft.qpos.len()),
+                com: whole.com,
+                com_velocity: whole.com_velocity,
+                linear_momentum: whole.linear_momentum,
+                angular_momentum: whole.angular_momentum,
+                contact: Vec::new(),
+                root_wrench_residual: Vec::new(),
+            },
             qpos: draft.qpos,
             qvel,
             bodies,
-            tracks,
             report: None,
             source: None,
+        };
+        let stands = draft.contact.unwrap_or_else(|| motion.stances(skeleton));
+        motion.put_on_ground(skeleton, stands);
+        motion
+    }
+
+    /// The same motion with contacts of all bodies of its character, for one that an older version made: those had the feet's,
+    /// and the hands' where the clip puts them down. A motion without a ground stays one.
+    ///
+    /// # Panics
+    /// If the motion was made for another skeleton (see [`Motion::check_skeleton`]).
+    pub fn with_all_contacts(mut self, skeleton: &Skeleton) -> Self {
+        let bodies = skeleton.contact_bodies();
+        if self.contact_bodies.is_empty() || self.contact_bodies == bodies {
+            return self;
         }
+        let column = |body: &usize| self.contact_bodies.iter().position(|b| b == body);
+        let columns: Vec<Option<usize>> = bodies.iter().map(column).collect();
+        let widen = |row: &Vec<bool>| columns.iter().map(|c| c.is_some_and(|c| row[c])).collect();
+        let stands = self.tracks.contact.iter().map(widen).collect();
+        self.contact_bodies = bodies;
+        self.put_on_ground(skeleton, stands);
+        self
+    }
+
+    /// Sets the contacts to what stands, which is known, and what carries besides; and the residual of the root's wrench.
+    fn put_on_ground(&mut self, skeleton: &Skeleton, mut stands: Vec<Vec<bool>>) {
+        let (leg, timeline) = (skeleton.leg_length(), self.timeline());
+        let (com, spin) = (&self.tracks.com, &self.tracks.angular_momentum);
+        let mass = skeleton.total_mass();
+        let required = wrench::required(com, spin, mass, self.fps, &timeline);
+        let carried = Carried {
+            skeleton,
+            bodies: &self.bodies,
+            twists: &twists(skeleton, &self.qpos, &self.qvel),
+            com,
+            required: &required,
+            fps: self.fps,
+            timeline: &timeline,
+        };
+        let reach = vec![TOUCHING * leg; self.contact_bodies.len()];
+        let carries = carried.by(&self.contact_bodies, &reach);
+        for (row, carries) in stands.iter_mut().zip(carries) {
+            row.iter_mut().zip(carries).for_each(|(on, c)| *on |= c);
+        }
+        let support = Support {
+            skeleton,
+            leg,
+            bodies: &self.bodies,
+            com,
+            required: &required,
+            standing: Standing {
+                bodies: &self.contact_bodies,
+                contact: &stands,
+            },
+            fps: self.fps,
+            timeline: &timeline,
+        };
+        let residual = (0..self.bodies.len()).map(|f| support.residual(f));
+        self.tracks.root_wrench_residual = residual.collect();
+        self.tracks.contact = stands;
+    }
+
+    /// `[f][c]`: whether each contact body stands on the ground at z = 0.
+    fn stances(&self, skeleton: &Skeleton) -> Vec<Vec<bool>> {
+        let leg = skeleton.leg_length();
+        let of = |body: &usize| {
+            let points = |poses: &Vec<_>| skeleton.ground_points(poses, *body);
+            let points: Vec<Vec<Vector3<f64>>> = self.bodies.iter().map(points).collect();
+            contact::detect_above(&points, 0.0, self.fps, leg, self.loop_mode)
+        };
+        let tracks: Vec<Vec<bool>> = self.contact_bodies.iter().map(of).collect();
+        let row = |f: usize| tracks.iter().map(|track| track[f]).collect();
+        (0..self.bodies.len()).map(row).collect()
     }
 
     /// Checks that this motion was made for `skeleton`.
@@ -113,23 +164,4 @@ impl Motion {
             skeleton: skeleton.name.clone(),
         })
     }
-}
-
-/// `[f][c]`: whether each contact body stands on the ground at z = 0.
-fn contacts(skeleton: &Skeleton, bodies: &[Vec<Isometry3<f64>>], draft: &Draft) -> Vec<Vec<bool>> {
-    let leg = skeleton.leg_length();
-    let per_body: Vec<Vec<bool>> = draft
-        .contact_bodies
-        .iter()
-        .map(|&body| {
-            let points: Vec<Vec<Vector3<f64>>> = bodies
-                .iter()
-                .map(|poses| skeleton.ground_points(poses, body))
-                .collect();
-            contact::detect_above(&points, 0.0, draft.fps, leg, draft.loop_mode)
-        })
-        .collect();
-    (0..bodies.len())
-        .map(|f| per_body.iter().map(|track| track[f]).collect())
-        .collect()
 }

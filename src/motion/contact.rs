@@ -64,15 +64,28 @@ fn detect_each(
         let path: Vec<Vector3<f64>> = points.iter().map(|frame| frame[point]).collect();
         let level = floor(&path);
         let states = states(&path, level, fps, leg_length, loop_mode);
-        for run in runs(&states, loop_mode, |s| *s != State::Away) {
-            // A run that is nowhere clearly slow and low is a foot that passes the ground.
-            if run.iter().any(|&f| states[f] == State::Clear) {
-                run.iter().for_each(|&f| stands[f] = true);
-            }
-        }
+        hold_on(&states, &mut stands, loop_mode);
     }
     settle(&mut stands, fps, loop_mode);
     stands
+}
+
+/// In which frames something is on the ground that is surely there in some and may be in others.
+pub(crate) fn settled(states: &[State], fps: f64, loop_mode: LoopMode) -> Vec<bool> {
+    let mut on = vec![false; states.len()];
+    hold_on(states, &mut on, loop_mode);
+    settle(&mut on, fps, loop_mode);
+    on
+}
+
+/// Sets the frames of all runs of states that are clear somewhere and fair everywhere. A run that is nowhere clear is a foot
+/// that passes the ground.
+fn hold_on(states: &[State], on: &mut [bool], loop_mode: LoopMode) {
+    for run in runs(states, loop_mode, |s| *s != State::Away) {
+        if run.iter().any(|&f| states[f] == State::Clear) {
+            run.iter().for_each(|&f| on[f] = true);
+        }
+    }
 }
 
 /// The height below which a path is in only a few frames, metres.
@@ -83,14 +96,14 @@ fn floor_level(path: &[Vector3<f64>]) -> f64 {
     heights.get(at as usize).copied().unwrap_or(0.0)
 }
 
-/// How surely a point stands in one frame.
+/// How surely something is on the ground in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
-    /// Slow and low beyond doubt.
+pub(crate) enum State {
+    /// Beyond doubt.
     Clear,
-    /// Slow and low enough to go on standing.
+    /// Enough to go on being there.
     Fair,
-    /// Fast or high.
+    /// Not there.
     Away,
 }
 

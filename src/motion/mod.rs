@@ -29,6 +29,7 @@
 //! ```
 
 mod build;
+mod carry;
 mod check;
 pub mod contact;
 mod error;
@@ -48,6 +49,7 @@ mod velocity;
 mod wrench;
 
 pub use build::Draft;
+pub(crate) use carry::{Path, carrying};
 pub use check::Check;
 pub use error::MotionError;
 pub use report::{MappedJoint, RetargetReport, Spread};

@@ -181,27 +181,36 @@ impl Support<'_> {
             .collect()
     }
 
-    /// The rays' wrenches about the centre of mass as columns, and the required wrench. Moments are divided by a leg's
-    /// length, so that forces and moments are in newtons both and errors in them are comparable.
+    /// As in [`wrench_equations`].
     fn equations(&self, f: usize, rays: &[Load]) -> (DMatrix<f64>, DVector<f64>) {
-        let column = |force: &Vector3<f64>, moment: Vector3<f64>| {
-            let moment = moment / self.length();
-            Vector6::from_iterator(force.iter().chain(moment.iter()).copied())
-        };
-        let required = &self.required[f];
-        let target = column(&required.force, required.moment);
-        let columns: Vec<Vector6<f64>> = rays
-            .iter()
-            .map(|ray| column(&ray.force, (ray.point - self.com[f]).cross(&ray.force)))
-            .collect();
-        let a = DMatrix::from_fn(6, columns.len(), |row, j| columns[j][row]);
-        (a, DVector::from_column_slice(target.as_slice()))
+        wrench_equations(rays, &self.required[f], &self.com[f], self.length())
     }
 
     /// What moments are divided by, metres; a skeleton without legs mustn't make it zero.
     fn length(&self) -> f64 {
         self.leg.max(1e-3)
     }
+}
+
+/// The wrenches of `loads` about the centre of mass as columns, and the required wrench. Moments are divided by a leg's length,
+/// metres, so that forces and moments are in newtons both and errors in them are comparable.
+pub(super) fn wrench_equations(
+    loads: &[Load],
+    required: &Wrench,
+    com: &Vector3<f64>,
+    leg: f64,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let column = |force: &Vector3<f64>, moment: Vector3<f64>| {
+        let moment = moment / leg;
+        Vector6::from_iterator(force.iter().chain(moment.iter()).copied())
+    };
+    let target = column(&required.force, required.moment);
+    let columns: Vec<Vector6<f64>> = loads
+        .iter()
+        .map(|load| column(&load.force, (load.point - com).cross(&load.force)))
+        .collect();
+    let a = DMatrix::from_fn(6, columns.len(), |row, j| columns[j][row]);
+    (a, DVector::from_column_slice(target.as_slice()))
 }
 
 /// Bodies that touch the ground but have no contact track: they carry a character that sits, kneels or lies.
@@ -220,7 +229,7 @@ fn lying<'a>(
 }
 
 /// The edge forces of the friction pyramids under one body, each with 1 N upwards.
-fn friction_rays(
+pub(super) fn friction_rays(
     skeleton: &Skeleton,
     poses: &[Isometry3<f64>],
     body: usize,

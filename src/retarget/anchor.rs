@@ -14,6 +14,8 @@ pub(super) struct Anchor {
     pub weight: f64,
     /// How firmly it is held there: 0 to 1, rising where a stance begins and falling where it ends.
     pub hold: f64,
+    /// Whether only its height counts: what rolls or slides over the ground isn't held in place.
+    pub is_level: bool,
 }
 
 /// Weight from which on an anchor counts as contact. Chosen: half.

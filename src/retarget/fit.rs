@@ -8,6 +8,7 @@
 
 mod ballistic;
 mod banded;
+mod carriers;
 mod cost;
 mod flight;
 mod smoothness;
@@ -63,6 +64,8 @@ pub(super) struct Fit<'a> {
 
 /// A fitted trajectory.
 pub(super) struct Fitted {
+    /// The points that stand or carry, by frame.
+    pub anchors: Vec<Vec<Anchor>>,
     /// Coordinates of every frame; the last one of a cycle is the first, carried on.
     pub frames: Vec<Vec<f64>>,
     /// Most steps that a window took in the first fit.
@@ -80,8 +83,23 @@ struct Fitting {
 impl<'a> Fit<'a> {
     /// Fits a trajectory to the goals.
     pub fn run(&self, goals: Goals) -> Fitted {
-        let (fitting, iterations) = self.first(goals);
+        let (mut fitting, iterations) = self.first(goals);
         (self.progress)(FIRST_FIT);
+        // What carries the body is found in the trajectory, too, and is part of it from now on.
+        let carried = carriers::anchors(self, &fitting.frames);
+        let anchors = carried.unwrap_or_else(|| self.anchors.to_vec());
+        let fit = Fit {
+            anchors: &anchors,
+            ..*self
+        };
+        let carries = |f: usize, _: &[f64]| anchors[f].iter().any(|anchor| anchor.is_level);
+        fit.solver(&fit.least_squares(&fitting.goals))
+            .repair(&mut fitting.frames, carries);
+        fit.with_physics(fitting, iterations)
+    }
+
+    /// Makes the first fit a trajectory that a body could follow.
+    fn with_physics(&self, fitting: Fitting, iterations: usize) -> Fitted {
         // Flights are found in the fitted trajectory, for the goals may float or sink.
         let (flights, shifts) = flight::find(&self.trajectory(&fitting.frames));
         let (frames, problems) = match flights.is_empty() {
@@ -92,6 +110,7 @@ impl<'a> Fit<'a> {
             false => self.with_flights(fitting, &flights, &shifts),
         };
         Fitted {
+            anchors: self.anchors.to_vec(),
             frames: self.whole_cycle(frames),
             iterations,
             problems,

@@ -131,7 +131,7 @@ pub fn retarget_watched(
         .chain(found.into_iter().flatten());
     let outcome = Outcome {
         frames: fitted.frames,
-        anchors: planted.anchors,
+        anchors: fitted.anchors,
         effectors: planted.effectors,
         cycle: closed.seam.map(|seam| seam.cycle),
         source: placed.source,

@@ -59,7 +59,7 @@ pub(super) fn finish(
         contacts,
         problems,
     } = outcome.own(input);
-    let contact_bodies = contact_bodies(model, &effectors, &anchors);
+    let contact_bodies = model.skeleton.contact_bodies();
     let contact = contact(model, &anchors, &contact_bodies);
     let draft = draft(&input.clip, cycle, frames, contact, contact_bodies);
     let mut motion = Motion::from_poses(model.skeleton, draft);
@@ -92,22 +92,6 @@ fn draft(
         contact: Some(contact),
         contact_bodies,
     }
-}
-
-/// Bodies that may touch the ground: those of the feet, and those of hands that the clip sets down; ascending.
-fn contact_bodies(model: &Model, effectors: &[EndEffector], anchors: &[Vec<Anchor>]) -> Vec<usize> {
-    let body = |point: usize| model.contact_points[point].body;
-    let used = |b: usize| anchors.iter().flatten().any(|a| body(a.point) == b);
-    let mut bodies: Vec<usize> = Vec::new();
-    for effector in effectors {
-        for b in effector.points.iter().map(|point| body(*point)) {
-            if !bodies.contains(&b) && (effector.is_foot || used(b)) {
-                bodies.push(b);
-            }
-        }
-    }
-    bodies.sort_unstable();
-    bodies
 }
 
 /// `contact[f][c]`: whether contact body `c` stands at frame `f`.

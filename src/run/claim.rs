@@ -64,6 +64,13 @@ impl Claim {
         skeleton: Skeleton,
         motions: Vec<Motion>,
     ) -> Result<Run, RunError> {
+        // Clips of older versions may have other contacts; those of the character are alike for all.
+        let fits = |motion: &Motion| motion.check_skeleton(&skeleton).is_ok();
+        let whole = |motion: Motion| match fits(&motion) {
+            true => motion.with_all_contacts(&skeleton),
+            false => motion,
+        };
+        let motions: Vec<Motion> = motions.into_iter().map(whole).collect();
         check(&plan, &skeleton, &motions)?;
         // What a killed process left gives way now that a run will take its place.
         remove(&self.dir, |name| name != LOCK && files::is_own(name));

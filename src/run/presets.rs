@@ -154,6 +154,7 @@ fn deepmimic2018() -> Plan {
         horizon: 64,
         samples: 60_000_000,
         final_std: 1.0,
+        final_learning_rate: 1.0,
         ..base
     }
 }

@@ -108,6 +108,13 @@ impl Skeleton {
         (upright * top).z - self.lowest_point_of(&turned, &[lower])
     }
 
+    /// The bodies that can touch the ground: those with shapes, ascending.
+    pub fn contact_bodies(&self) -> Vec<usize> {
+        let bodies = self.bodies.iter().enumerate();
+        let shaped = bodies.filter(|(_, body)| !body.shapes.is_empty());
+        shaped.map(|(b, _)| b).collect()
+    }
+
     /// Height of the lowest point of all shapes, metres; of the bodies' origins if there are no shapes. `poses` is world from
     /// body, `[bodies]`.
     pub fn lowest_point(&self, poses: &[Isometry3<f64>]) -> f64 {

@@ -164,17 +164,15 @@ pub fn step_together(environments: &mut [Stepping], actions: &[f32]) -> Vec<Step
     ended.collect()
 }
 
-/// The frame to which a `step` of an environment of `task` has led.
-pub fn frame(task: &dyn Task, environment: &dyn Environment, step: &Step) -> Frame {
+/// The frame to which a `step` of an environment has led.
+pub fn frame(environment: &dyn Environment, step: &Step) -> Frame {
     let world = environment.world();
-    let bodies = &task.model().character.bodies;
-    let contact = |&body: &usize| world.contacts()[bodies[body].link];
     Frame {
         time: environment.moment().time,
         agent: world.states().to_vec(),
         reference: environment.reference(),
         dynamics: *environment.dynamics(),
-        contacts: task.contact_bodies().iter().map(contact).collect(),
+        contacts: environment.touching().to_vec(),
         terms: step.terms.clone(),
         reward: step.reward,
         push: environment.push(),

@@ -3,6 +3,7 @@
 //! [`Task`] and [`Environment`] are all that a learner, an evaluation, a replay or a live player knows of a task.
 //! [`TaskSettings`] says which task it is and makes it; [`Imitate`] is the phase-based imitation of reference motions.
 
+mod contact;
 mod disturbance;
 mod dynamics;
 mod environment;
@@ -15,6 +16,7 @@ mod starts;
 mod step;
 mod verdict;
 
+pub use contact::ContactBody;
 pub use disturbance::Perturbations;
 pub use dynamics::Dynamics;
 pub use environment::{Draws, Environment, Stepping, Task, frame, step, step_together};

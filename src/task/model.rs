@@ -1,5 +1,6 @@
 //! The character of a task, with the bodies that observations and rewards look at.
 
+use super::contact::ContactBody;
 use super::error::TaskError;
 use crate::humanoid::Slot;
 use crate::sim::{Character, Link, LinkState, SimError};
@@ -33,6 +34,8 @@ pub struct CharacterModel {
     pub end_bodies: Vec<usize>,
     /// The chest where the skeleton has one.
     pub chest_body: Option<usize>,
+    /// The bodies that can touch the ground.
+    pub contacts: Vec<ContactBody>,
     /// Heel, left of the toes, right of the toes, of each foot.
     pub soles: Vec<SolePoint>,
     /// One per link: how much its joint counts where joints are weighted. The weights of all joints add up to 1.
@@ -73,6 +76,7 @@ impl CharacterModel {
                 .chain(end_bodies.iter().copied())
                 .collect(),
             chest_body: body(&Slot::Chest),
+            contacts: ContactBody::all(&skeleton, &character),
             soles: soles(&skeleton, &character),
             end_bodies,
             joint_weights: joint_weights(&skeleton, &character),
@@ -89,6 +93,13 @@ impl CharacterModel {
     ) -> impl Iterator<Item = Vector3<f32>> + 'a {
         let bodies = 0..self.character.bodies.len();
         bodies.map(|b| self.character.body_pose(links, b).translation.vector)
+    }
+
+    /// The number of a body among [`CharacterModel::contacts`].
+    pub fn contact(&self, body: usize) -> Option<usize> {
+        self.contacts
+            .iter()
+            .position(|contact| contact.body == body)
     }
 
     /// The body that is shoved: the chest, or the root where the skeleton has none.

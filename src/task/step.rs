@@ -139,6 +139,8 @@ pub struct ReferenceState {
     pub dynamics: Dynamics,
     /// One per [`super::Task::contact_bodies`]: whether the reference stands on the ground with it.
     pub contacts: Vec<bool>,
+    /// One per [`super::CharacterModel::contacts`]: whether the agent may touch the ground with it.
+    pub may_touch: Vec<bool>,
     /// 0 at the first frame of a cycle, 1 at its last.
     pub phase: f32,
     /// World from anchor, where the anchor is on the ground below the root at the first frame of this cycle, and X points

@@ -195,8 +195,15 @@ impl LeastSquares<'_> {
             let point = &self.model.contact_points[anchor.point];
             let at = point.place(&pose.bodies);
             self.levers(point.body, pose, &at, columns);
+            let mut off = at - anchor.at;
+            if anchor.is_level {
+                off = upright(&off);
+                columns
+                    .iter_mut()
+                    .for_each(|(_, lever)| *lever = upright(lever));
+            }
             // The hold fades in and out, so that a stance begins and ends without a jerk.
-            cost += to.add(columns, &(at - anchor.at), weight::STANCE * anchor.hold);
+            cost += to.add(columns, &off, weight::STANCE * anchor.hold);
         }
         cost
     }
@@ -212,8 +219,8 @@ impl LeastSquares<'_> {
                 self.levers(point.body, pose, &at, columns);
                 columns
                     .iter_mut()
-                    .for_each(|(_, lever)| *lever = Vector3::new(0.0, 0.0, lever.z));
-                cost += to.add(columns, &Vector3::new(0.0, 0.0, below), self.ground);
+                    .for_each(|(_, lever)| *lever = upright(lever));
+                cost += to.add(columns, &(Vector3::z() * below), self.ground);
             }
         }
         cost
@@ -281,6 +288,11 @@ impl LeastSquares<'_> {
         }
         cost
     }
+}
+
+/// The vertical part of a vector.
+fn upright(v: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::z() * v.z
 }
 
 /// A ball joint's rotation vector, and how far each of its components is outside of its limits, radians.

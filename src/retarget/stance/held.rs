@@ -51,6 +51,7 @@ impl Held {
             at: self.at,
             weight: self.weight,
             hold: self.hold,
+            is_level: false,
         }
     }
 }

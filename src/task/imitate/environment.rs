@@ -9,6 +9,7 @@ use super::settings::{ImitationSettings, Terminations};
 use super::terminate::{failure, mean_distance};
 use crate::clip::LoopMode;
 use crate::sim::{Diverged, Target, World};
+use crate::task::contact::ContactBody;
 use crate::task::disturbance::{Disturbance, Perturbations};
 use crate::task::dynamics::Dynamics;
 use crate::task::environment::{Draws, Environment};
@@ -22,8 +23,9 @@ use nalgebra::Vector3;
 use rand_chacha::rand_core::Rng;
 use std::sync::Arc;
 
-/// A body at most this far above the lowest one stands on the ground too, metres. Chosen: the soles of one character differ by less.
-const STANDING: f64 = 0.01;
+/// A body at most this far above the ground stands on it in the rest pose, metres. Chosen: the soles of one character differ by
+/// less.
+const STANDING: f32 = 0.01;
 
 /// Mean distance of the bodies from their reference beyond which an episode of an evaluation has failed, metres: the
 /// criterion of PHC (Luo et al. 2023, "Perpetual humanoid control for real-time simulated avatars").
@@ -49,7 +51,9 @@ pub(super) struct Imitation {
     dynamics: Dynamics,
     targets: Vec<Target>,
     last_action: Vec<f32>,
-    /// Per contact link of the reference: whether the agent presses on the ground with it.
+    /// Per contact body of the character: whether the agent presses on the ground with it.
+    pressing: Vec<bool>,
+    /// The same per contact body of the reference.
     touching: Vec<bool>,
     disturbance: Option<Disturbance>,
     /// Impulse that a player asked for, N·s.
@@ -83,6 +87,7 @@ impl Imitation {
             ahead: vec![first.blank(); settings.observations.ahead().len()],
             targets: vec![Target::Free; model.character.links.len()],
             last_action: vec![0.0; model.character.dof],
+            pressing: Vec::new(),
             touching: Vec::new(),
             disturbance: None,
             asked_push: None,
@@ -124,13 +129,10 @@ impl Imitation {
         for state in &mut states {
             state.pose = place * state.pose;
         }
-        let lowest = skeleton.lowest_point(&poses);
-        let stands = |link: &usize| {
-            let body = self.model.character.links[*link].body;
-            skeleton.lowest_point_of(&poses, &[body]) < lowest + STANDING
-        };
+        let stands = |contact: &ContactBody| contact.lowest(&states) < STANDING;
+        self.pressing = self.model.contacts.iter().map(stands).collect();
+        self.look_at_contacts();
         let reference = self.playback.reference();
-        self.touching = reference.contact_links.iter().map(stands).collect();
         self.world.reset(&states);
         self.dynamics = reference.masses().dynamics(&states);
     }
@@ -287,16 +289,23 @@ impl Imitation {
         }
     }
 
+    /// Picks the contact bodies of the reference among those of the character.
+    fn look_at_contacts(&mut self) {
+        let of_motion = self.playback.reference().contacts_of_motion.iter();
+        self.touching.clear();
+        self.touching.extend(of_motion.map(|&c| self.pressing[c]));
+    }
+
     /// How the episode stands after a step with this `reward`: failures first, for they hold at the end of a motion too.
     fn outcome(&self, reward: f32) -> Outcome {
-        let (states, contacts) = (self.world.states(), self.world.contacts());
+        let states = self.world.states();
         let reference = self.playback.reference();
         match failure(
             &self.settings.terminations,
             states,
             &self.next.links,
-            contacts,
-            &reference.contact_links,
+            &self.pressing,
+            &self.next.may_touch,
             reward,
         ) {
             Some(failure) => Outcome::Failed(failure),
@@ -421,10 +430,12 @@ impl Environment for Imitation {
                 outcome: Outcome::Failed(Failure::Diverged),
             };
         }
-        let pressed = self.world.contacts();
-        let links = self.playback.reference().contact_links.iter();
-        self.touching.clear();
-        self.touching.extend(links.map(|&link| pressed[link]));
+        let (states, pressed) = (self.world.states(), self.world.contacts());
+        let contacts = self.model.contacts.iter();
+        self.pressing.clear();
+        self.pressing
+            .extend(contacts.map(|contact| contact.touches(states, pressed)));
+        self.look_at_contacts();
         self.dynamics = self
             .playback
             .reference()

@@ -23,16 +23,17 @@ const GLOBAL_MM: f64 = 100.0;
 /// a radian per second has about as much.
 const NO_MOMENTUM: f32 = 1e-3;
 
-/// Measures episodes of one case. `largest_momentum` is the largest angular momentum of its reference, kg·m²/s.
+/// Measures episodes of one case, whose frames have flags of these `contact_bodies` of the model. `largest_momentum` is the
+/// largest angular momentum of its reference, kg·m²/s.
 pub fn measures(
     model: &CharacterModel,
-    contact_links: &[usize],
+    contact_bodies: &[usize],
     largest_momentum: f32,
     episodes: &[Episode],
 ) -> Vec<Measure> {
     let mut all = success(model, episodes).to_vec();
     all.extend(errors_of_frames(model, largest_momentum, episodes));
-    all.extend(contacts(model, contact_links, episodes));
+    all.extend(contacts(model, contact_bodies, episodes));
     all.extend(turning(episodes));
     all
 }
@@ -112,14 +113,14 @@ fn errors_of_frames(
 }
 
 /// How well contacts with the ground agree with the reference's, and how fast what stands on the ground slides along it.
-fn contacts(model: &CharacterModel, links: &[usize], episodes: &[Episode]) -> [Measure; 2] {
+fn contacts(model: &CharacterModel, bodies: &[usize], episodes: &[Episode]) -> [Measure; 2] {
     [
         Measure::new("contact_f1", "contact F1", contact_f1(episodes))
             .good(Good::High, Unit::Score),
         Measure::new(
             "foot_skate_m_s",
             "foot skate",
-            foot_skate(model, links, episodes),
+            foot_skate(model, bodies, episodes),
         )
         .good(Good::Low, Unit::MetersPerSecond),
     ]
@@ -177,7 +178,7 @@ fn velocity_error(frame: &Frame, reference: &ReferenceState) -> f64 {
     mean(links.map(|(a, b)| f64::from((a.linear - b.linear).norm())))
 }
 
-/// 2PR/(P + R) of contact link × frame, with precision P and recall R.
+/// 2PR/(P + R) of contact body × frame, with precision P and recall R.
 fn contact_f1(episodes: &[Episode]) -> f64 {
     let (mut both, mut either) = (0usize, 0usize);
     for (frame, reference) in episodes.iter().flat_map(pairs) {
@@ -194,11 +195,17 @@ fn contact_f1(episodes: &[Episode]) -> f64 {
     }
 }
 
-/// Mean horizontal speed of a contact link on the ground while it presses on it, m/s; see [`skate::sole_speed`].
-fn foot_skate(model: &CharacterModel, links: &[usize], episodes: &[Episode]) -> f64 {
+/// Mean horizontal speed of a foot or hand on the ground while it presses on it, m/s; see [`skate::sole_speed`]. Where several
+/// bodies of a link press, the link counts for each.
+fn foot_skate(model: &CharacterModel, bodies: &[usize], episodes: &[Episode]) -> f64 {
     mean(episodes.iter().flat_map(|e| &e.frames).flat_map(|frame| {
-        let standing = links.iter().zip(&frame.contacts).filter(|(_, c)| **c);
-        standing.map(move |(&link, _)| sole_speed(&model.character.links[link], &frame.agent[link]))
+        let contacts = bodies.iter().map(|&c| &model.contacts[c]);
+        let standing = contacts.zip(&frame.contacts);
+        let standing = standing.filter(|(contact, on)| **on && contact.is_end);
+        standing.map(move |(contact, _)| {
+            let link = contact.link;
+            sole_speed(&model.character.links[link], &frame.agent[link])
+        })
     }))
 }
 

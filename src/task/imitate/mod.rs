@@ -18,6 +18,7 @@ mod settings;
 mod terminate;
 #[cfg(test)]
 mod tests;
+mod touch;
 mod transition;
 mod verdict;
 
@@ -95,13 +96,13 @@ fn contacts(references: &[Arc<Reference>]) -> Result<usize, TaskError> {
     let first = references.first().ok_or(TaskError::NoMotion)?;
     let other = references
         .iter()
-        .find(|r| r.contact_links != first.contact_links);
+        .find(|r| r.contact_bodies != first.contact_bodies);
     match other {
         Some(other) => Err(TaskError::OtherContacts {
             first: first.name.clone(),
             other: other.name.clone(),
         }),
-        None => Ok(first.contact_links.len()),
+        None => Ok(first.contact_bodies.len()),
     }
 }
 
@@ -176,8 +177,8 @@ impl Task for Imitate {
     fn measures(&self, episodes: &[Episode]) -> Vec<Measure> {
         let largest = |e: &Episode| self.references[e.start.case].largest_momentum();
         let largest_momentum = episodes.iter().map(largest).fold(0.0, f32::max);
-        let links = &self.references[0].contact_links;
-        measures::measures(&self.model, links, largest_momentum, episodes)
+        let contacts = &self.references[0].contacts_of_motion;
+        measures::measures(&self.model, contacts, largest_momentum, episodes)
     }
 
     fn verdict(&self, found: &Performance) -> Verdict {

@@ -1,6 +1,7 @@
 //! The reference motion as link states, at any time.
 
 use super::placement::{Placement, anchor, moved};
+use super::touch::may_touch;
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
@@ -35,14 +36,16 @@ pub struct Reference {
     /// Anchor of the first cycle.
     start: Isometry3<f32>,
     contacts: Vec<Vec<bool>>,
+    /// For every frame, one per [`CharacterModel::contacts`]: whether the agent may touch the ground with it.
+    may_touch: Vec<Vec<bool>>,
     cycle: Cycle,
     /// For every frame, positions and velocities of its links as [`seen_from_root`] sees them.
     grounded: Vec<Vec<[Vector3<f32>; 2]>>,
     masses: Masses,
     /// Bodies that the motion puts on the ground.
     pub contact_bodies: Vec<usize>,
-    /// The links that carry them.
-    pub contact_links: Vec<usize>,
+    /// Their numbers among [`CharacterModel::contacts`].
+    pub contacts_of_motion: Vec<usize>,
 }
 
 impl Reference {
@@ -75,15 +78,16 @@ impl Reference {
             duration,
             start: anchor(&frames[0][0].pose),
             grounded: frames.iter().map(|links| seen_from_root(links)).collect(),
+            may_touch: may_touch(model, &frames, rate, motion.loop_mode),
             frames,
             contacts: times().map(contact).collect(),
             cycle: motion.cycle,
             masses: Masses::new(&model.character),
             contact_bodies: motion.contact_bodies.clone(),
-            contact_links: motion
+            contacts_of_motion: motion
                 .contact_bodies
                 .iter()
-                .map(|&b| model.character.bodies[b].link)
+                .filter_map(|&b| model.contact(b))
                 .collect(),
         })
     }
@@ -133,6 +137,7 @@ impl Reference {
             links: self.frames[0].clone(),
             dynamics: Dynamics::default(),
             contacts: self.contacts[0].clone(),
+            may_touch: self.may_touch[0].clone(),
             phase: 0.0,
             anchor: self.start,
         }
@@ -167,6 +172,7 @@ impl Reference {
         sample.dynamics = self.masses.dynamics(&sample.links);
         let nearest = if blend < 0.5 { frame } else { frame + 1 };
         sample.contacts.copy_from_slice(&self.contacts[nearest]);
+        sample.may_touch.copy_from_slice(&self.may_touch[nearest]);
         sample.phase = (within / self.duration) as f32;
         sample.anchor = place.pose * self.start;
     }

@@ -14,14 +14,14 @@ pub fn furthest(links: &[LinkState], reference: &[LinkState]) -> f32 {
         .fold(0.0, f32::max)
 }
 
-/// Which of the rules an agent has broken, if any. `contacts` holds one flag per link, `allowed` the links that may touch the
-/// ground, and `reward` is that of the step.
+/// Which of the rules an agent has broken, if any. `touching` says of each body that can touch the ground
+/// whether it does, `may_touch` whether it may, and `reward` is that of the step.
 pub fn failure(
     rules: &Terminations,
     links: &[LinkState],
     reference: &[LinkState],
-    contacts: &[bool],
-    allowed: &[usize],
+    touching: &[bool],
+    may_touch: &[bool],
     reward: f32,
 ) -> Option<Failure> {
     let lost = |most: f32| furthest(links, reference) > most;
@@ -29,10 +29,8 @@ pub fn failure(
         return Some(Failure::Distance);
     }
     let fell = || {
-        contacts
-            .iter()
-            .enumerate()
-            .any(|(link, touches)| *touches && !allowed.contains(&link))
+        let mut each = touching.iter().zip(may_touch);
+        each.any(|(touches, may)| *touches && !may)
     };
     if rules.fall && fell() {
         return Some(Failure::Fall);

@@ -72,6 +72,7 @@ fn rough(skeleton: &Skeleton, count: usize) -> (Goals, Vec<Vec<Anchor>>, Vec<Vec
         at: Vector3::new(0.1, 0.2, 0.0),
         weight: 0.6,
         hold: 0.6,
+        is_level: point % 2 == 1,
     };
     (
         goals,
