@@ -56,13 +56,21 @@ pub(crate) struct Path<'a> {
     pub(crate) cycle: Option<&'a Cycle>,
 }
 
-/// As [`Carried::by`], from coordinates alone.
+/// What carries, by frame.
+pub(crate) struct Carrying {
+    /// As [`Carried::by`] has it.
+    pub(crate) by: Vec<Vec<bool>>,
+    /// The force upwards that the motion needs, as a share of the weight: 1 at rest, 0 in free fall.
+    pub(crate) need: Vec<f64>,
+}
+
+/// What carries, from coordinates alone; see [`Carried::by`].
 pub(crate) fn carrying(
     skeleton: &Skeleton,
     path: &Path,
     candidates: &[usize],
     reach: &[f64],
-) -> Vec<Vec<bool>> {
+) -> Carrying {
     let (loop_mode, cycle) = match path.cycle {
         Some(cycle) => (LoopMode::Wrap, *cycle),
         None => (LoopMode::Clamp, Cycle::NONE),
@@ -83,7 +91,7 @@ pub(crate) fn carrying(
         path.fps,
         &timeline,
     );
-    Carried {
+    let carried = Carried {
         skeleton,
         bodies: &bodies,
         twists: &twists(skeleton, path.qpos, &qvel),
@@ -91,8 +99,12 @@ pub(crate) fn carrying(
         required: &required,
         fps: path.fps,
         timeline: &timeline,
+    };
+    let need = |wrench: &Wrench| wrench.force.z / (mass * GRAVITY);
+    Carrying {
+        by: carried.by(candidates, reach),
+        need: required.iter().map(need).collect(),
     }
-    .by(candidates, reach)
 }
 
 /// `[f][b]`: velocity of every body.

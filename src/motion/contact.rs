@@ -78,6 +78,18 @@ pub(crate) fn settled(states: &[State], fps: f64, loop_mode: LoopMode) -> Vec<bo
     on
 }
 
+/// The runs of flagged frames that last at least as long as a stance.
+pub(crate) fn lasting(flags: &[bool], fps: f64, loop_mode: LoopMode) -> Vec<bool> {
+    let shortest = (SHORTEST * fps).round() as usize;
+    let mut lasting = vec![false; flags.len()];
+    for run in runs(flags, loop_mode, |flag| *flag) {
+        if run.len() >= shortest {
+            run.iter().for_each(|&f| lasting[f] = true);
+        }
+    }
+    lasting
+}
+
 /// Sets the frames of all runs of states that are clear somewhere and fair everywhere. A run that is nowhere clear is a foot
 /// that passes the ground.
 fn hold_on(states: &[State], on: &mut [bool], loop_mode: LoopMode) {

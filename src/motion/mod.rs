@@ -51,6 +51,7 @@ mod wrench;
 pub use build::Draft;
 pub(crate) use carry::{Path, carrying};
 pub use check::Check;
+pub(crate) use contact::lasting;
 pub use error::MotionError;
 pub use report::{MappedJoint, RetargetReport, Spread};
 pub use source::SourceRig;

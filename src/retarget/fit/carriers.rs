@@ -6,6 +6,7 @@
 //! follows smoothly.
 
 use super::Fit;
+use crate::clip::LoopMode;
 use crate::humanoid::Slot;
 use crate::motion::{self, Path};
 use crate::retarget::anchor::Anchor;
@@ -24,6 +25,10 @@ const NEAR_STANCE: f64 = 0.1;
 const FADE: f64 = 0.25;
 /// Height above a body's lowest point up to which its points go down with it, metres. Chosen.
 const LEVEL: f64 = 0.02;
+/// Force upwards from which on a motion in the air hovers, as a share of the weight, and height of its lowest point up to which
+/// it is put down, leg lengths. Chosen: clips of games whose hips keep their height hover by 10 cm with bent knees.
+const NEEDS: f64 = 0.75;
+const HOVERS: f64 = 0.2;
 /// Heights that are left alone, metres.
 const STILL: f64 = 0.002;
 
@@ -43,11 +48,14 @@ pub(super) fn anchors(fit: &Fit, frames: &[Vec<f64>]) -> Option<Vec<Vec<Anchor>>
         let lowest = |f: usize| fit.model.skeleton.lowest_point_of(&poses[f], &[body]);
         let drops = drops(&track, lowest, FADE * fit.fps, fit.cycle.is_some());
         for (f, drop) in drops.into_iter().enumerate() {
+            // What stands is on the ground already.
+            let drop = drop.filter(|_| !stands(fit.model, &fit.anchors[f], body));
             let Some(Drop { by, hold }) = drop else {
                 continue;
             };
-            is_changed |= by.abs() > STILL;
             let floor = lowest(f);
+            let by = by.max(-floor);
+            is_changed |= by.abs() > STILL;
             for (k, point) in fit.model.contact_points.iter().enumerate() {
                 let at = point.place(&poses[f]);
                 if point.body == body && at.z - point.radius < floor + LEVEL {
@@ -87,7 +95,8 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
         _ => TRUNK * leg,
     };
     let reach: Vec<f64> = bodies.iter().map(reach).collect();
-    let mut carries = motion::carrying(skeleton, &path, bodies, &reach);
+    let found = motion::carrying(skeleton, &path, bodies, &reach);
+    let mut carries = found.by;
     carries.truncate(frames.len());
     let near = (NEAR_STANCE * fit.fps).round() as usize;
     for (c, &body) in bodies.iter().enumerate() {
@@ -102,7 +111,43 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
             carries[f][c] &= !is_step && around.all(|(away, _)| away > near);
         }
     }
+    put_down(fit, frames, bodies, &found.need, &mut carries);
     carries
+}
+
+/// Lets the lowest bodies carry where nothing does and the motion needs most of its weight: it hovers, and no flight does. A
+/// jump at less than half its speed hovers, too.
+fn put_down(
+    fit: &Fit,
+    frames: &[Vec<f64>],
+    bodies: &[usize],
+    need: &[f64],
+    carries: &mut [Vec<bool>],
+) {
+    let skeleton = fit.model.skeleton;
+    let heights = |q: &Vec<f64>| -> Vec<f64> {
+        let poses = skeleton.forward(q);
+        let height = |body: &usize| skeleton.lowest_point_of(&poses, &[*body]);
+        bodies.iter().map(height).collect()
+    };
+    let heights: Vec<Vec<f64>> = frames.iter().map(heights).collect();
+    let lowest = |f: usize| heights[f].iter().copied().fold(f64::INFINITY, f64::min);
+    let stands = |f: usize| fit.anchors[f].iter().any(Anchor::is_contact);
+    let hovers = |f: usize| {
+        let near = lowest(f) < HOVERS * skeleton.leg_length();
+        near && need[f] > NEEDS && !carries[f].contains(&true) && !stands(f)
+    };
+    let hovers: Vec<bool> = (0..frames.len()).map(hovers).collect();
+    let loop_mode = match fit.cycle {
+        Some(_) => LoopMode::Wrap,
+        None => LoopMode::Clamp,
+    };
+    let hovers = motion::lasting(&hovers, fit.fps, loop_mode);
+    for f in (0..frames.len()).filter(|f| hovers[*f]) {
+        for (c, height) in heights[f].iter().enumerate() {
+            carries[f][c] |= *height < lowest(f) + LEVEL;
+        }
+    }
 }
 
 /// Whether a body stands on one of these anchors.
