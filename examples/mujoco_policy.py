@@ -24,6 +24,8 @@ from safetensors import safe_open
 # beyond its range a hinge may be aimed, and where normalised observations are cut off.
 TABLE_HZ = 120.0
 AVERAGED_S = 1.0 / 30.0
+# A body may touch the ground while the reference's is this near it, in leg lengths, and so long before and after; feet always may.
+NEAR_LEGS, AROUND_S = 0.06, 0.15
 FREELY = 1.0
 GRAVITY = np.array([0.0, 0.0, -9.81])
 BEYOND_LIMIT = 0.5
@@ -115,10 +117,27 @@ class Servos:
         data.ctrl[self.actuators] = rotation_vector(now) + left
 
 
+def lowest_of_geom(model, data, geom):
+    size, down = model.geom_size[geom], np.abs(data.geom_xmat[geom].reshape(3, 3)[2])
+    kind = model.geom_type[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return data.geom_xpos[geom][2] - down @ size
+    return data.geom_xpos[geom][2] - size[0] - (down[2] * size[1] if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0)
+
+
+def lowest(model, data):
+    """Height of the lowest point of every body; infinite without shapes."""
+    heights = np.full(model.nbody - 1, np.inf)
+    for geom in np.flatnonzero(model.geom_bodyid > 0):
+        body = model.geom_bodyid[geom] - 1
+        heights[body] = min(heights[body], lowest_of_geom(model, data, geom))
+    return heights
+
+
 class Reference:
     """The motion at any time: body states, contacts, phase."""
 
-    def __init__(self, model, path):
+    def __init__(self, model, path, leg):
         header, tensors = load(path)
         self.loops = header["loop"] == "wrap"
         self.cycle = header["cycle"]
@@ -129,7 +148,7 @@ class Reference:
         self.rate = fps * finer
         data, change = mujoco.MjData(model), np.zeros(model.nv)
         self.falls = self.falling(model, data, qpos, fps)
-        self.frames, self.contacts = [], []
+        self.frames, self.contacts, heights = [], [], []
         for row in range((len(qpos) - 1) * finer + 1):
             frame = min(row // finer, len(qpos) - 2)
             share = row / finer - frame
@@ -140,6 +159,22 @@ class Reference:
             mujoco.mj_forward(model, data)
             self.frames.append(Bodies.of(model, data))
             self.contacts.append(tensors["contact"][frame + (share >= 0.5)].astype(bool))
+            heights.append(lowest(model, data))
+        self.may_touch = self.allowed(np.array(heights), leg)
+
+    def allowed(self, heights, leg):
+        """Bodies that may touch the ground, by frame: those that the reference has near it a little before or after."""
+        low, reach = heights < NEAR_LEGS * leg, round(AROUND_S * self.rate)
+        last, wide = len(low) - 1, np.zeros_like(low)
+        for frame, row in enumerate(low):
+            for near in range(frame - reach, frame + reach + 1):
+                if self.loops:
+                    wide[near % last] |= row
+                elif 0 <= near <= last:
+                    wide[near] |= row
+        if self.loops:
+            wide[last] = wide[0]
+        return wide
 
     def falling(self, model, data, qpos, fps):
         """Frames, by number in any cycle, in which the centre of mass falls freely from the one before to the one after."""
@@ -202,7 +237,9 @@ class Reference:
         frame = min(int(at), len(self.frames) - 2)
         share = min(max(at - frame, 0.0), 1.0)
         bodies = self.frames[frame].blended(self.frames[frame + 1], share)
-        return bodies.moved(*self.offset(cycle)), self.contacts[frame + (share >= 0.5)], within / self.duration
+        nearest = frame + (share >= 0.5)
+        self.may = self.may_touch[nearest]
+        return bodies.moved(*self.offset(cycle)), self.contacts[nearest], within / self.duration
 
 
 class Agent:
@@ -226,8 +263,10 @@ class Agent:
         model.actuator_ctrllimited[:] = 0
         self.joints = [self.joint(run, body) for body in range(2, model.nbody) if model.body_jntnum[body]]
         self.keys = [model.body(slots[s]).id - 1 for s in ("head", "left-hand", "right-hand", "left-foot", "right-foot") if s in slots]
-        self.momentum_scale = self.size(slots)
-        self.reference = Reference(model, run / "reference-0.motion")
+        leg = self.leg(slots)
+        self.momentum_scale = model.body_mass.sum() * leg * np.sqrt(9.81 * leg)
+        self.reference = Reference(model, run / "reference-0.motion", leg)
+        self.feet = {b - 1 for b in range(1, model.nbody) if self.hangs_on(b, [slots[s] for s in ("left-foot", "right-foot") if s in slots])}
 
     def joint(self, run, body):
         """Body, its parent, axes of its coordinates, its actuators, and a hinge's range."""
@@ -243,21 +282,20 @@ class Agent:
         order = np.argmax(np.abs(along), axis=1).argsort()
         return body, model.body_parentid[body], axes, actuators[order], None if ball else model.jnt_range[joint]
 
-    def size(self, slots):
-        """Mass x leg length x sqrt(g x leg length), of a character that rests on straight legs."""
+    def hangs_on(self, body, names):
+        while body > 0:
+            if self.model.body(body).name in names:
+                return True
+            body = self.model.body_parentid[body]
+        return False
+
+    def leg(self, slots):
+        """Leg length of a character that rests on straight legs."""
         model, data = self.model, mujoco.MjData(self.model)
         mujoco.mj_kinematics(model, data)
         hip = data.xanchor[model.body(slots["left-upper-leg"]).jntadr[0]][2]
         foot = np.flatnonzero(model.geom_bodyid == model.body(slots["left-foot"]).id)
-        leg = hip - min(self.lowest(data, geom) for geom in foot)
-        return model.body_mass.sum() * leg * np.sqrt(9.81 * leg)
-
-    def lowest(self, data, geom):
-        size, down = self.model.geom_size[geom], np.abs(data.geom_xmat[geom].reshape(3, 3)[2])
-        kind = self.model.geom_type[geom]
-        if kind == mujoco.mjtGeom.mjGEOM_BOX:
-            return data.geom_xpos[geom][2] - down @ size
-        return data.geom_xpos[geom][2] - size[0] - (down[2] * size[1] if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0)
+        return hip - min(lowest_of_geom(model, data, geom) for geom in foot)
 
     def dynamics(self, bodies):
         """Centre of mass, its velocity, angular momentum about it."""
@@ -386,7 +424,7 @@ def perform(agent, seconds, start, show=None):
         touching = [body in pressed for body in reference.contact_bodies]
         apart = now - wanted.position
         errors.append(np.linalg.norm(apart - apart[0], axis=1).mean())
-        fallen = pressed - set(reference.contact_bodies)
+        fallen = {body for body in pressed - agent.feet if not reference.may[body]}
         if fallen:
             name = agent.model.body(min(fallen) + 1).name
             return time - begun, np.mean(errors), f"fell on `{name}`"

@@ -11,6 +11,7 @@ mod banded;
 mod carriers;
 mod cost;
 mod flight;
+mod friction;
 mod smoothness;
 mod solver;
 mod span;
@@ -31,6 +32,7 @@ use crate::motion::Cycle;
 use crate::skeleton::limits;
 use ballistic::FlightShift;
 use cost::LeastSquares;
+use nalgebra::Vector2;
 use solver::Solver;
 use span::Flight;
 use spin::FlightTurn;
@@ -38,6 +40,9 @@ use trajectory::Trajectory;
 
 /// Depth below the ground from which on a frame is solved again, metres. Chosen below the 1 cm that is asked of a motion.
 const DEEPEST: f64 = 0.004;
+
+/// How often the way is made smoother that a body takes over the ground.
+const FRICTION_GOES: usize = 3;
 
 /// Share of the work that the first fit is, and what is done once flights fall and once they spin freely. Chosen: of a walk
 /// of 11,001 frames the first fit took 14 of 18 s, and flights take more of it.
@@ -95,7 +100,29 @@ impl<'a> Fit<'a> {
         let carries = |f: usize, _: &[f64]| anchors[f].iter().any(|anchor| anchor.is_level);
         fit.solver(&fit.least_squares(&fitting.goals))
             .repair(&mut fitting.frames, carries);
+        if fit.to_perform {
+            fitting = fit.with_friction(fitting);
+        }
         fit.with_physics(fitting, iterations)
+    }
+
+    /// Leads the body along where the ground can push it.
+    fn with_friction(&self, mut fitting: Fitting) -> Fitting {
+        // What the ground can do depends on where the body is, so the way is found in several goes.
+        for _ in 0..FRICTION_GOES {
+            let Some(ways) = friction::shifts(self, &fitting.frames) else {
+                break;
+            };
+            let shift = |by: &Vector2<f64>| {
+                Some(FlightShift {
+                    by: by.push(0.0),
+                    flies: false,
+                })
+            };
+            let shifts: Vec<_> = ways.iter().map(shift).collect();
+            fitting = self.shifted(fitting, &shifts);
+        }
+        fitting
     }
 
     /// Makes the first fit a trajectory that a body could follow.

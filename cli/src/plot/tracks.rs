@@ -85,22 +85,25 @@ impl Sheet {
         LEFT + share.min(1.0) * (WIDTH - LEFT - RIGHT)
     }
 
-    /// Draws a bar for every stretch of time in which a body touches the ground.
+    /// Draws a bar for every stretch of time in which a body touches the ground, for each that ever does.
     fn lanes(&mut self, motion: &Motion) {
         let names = motion.contact_names();
         self.heading("ground contact");
         let top = self.y;
         let rows = &motion.tracks.contact;
-        for (contact, name) in names.iter().enumerate() {
-            let y = top + LANE * contact as f64;
+        let track = |contact: usize| -> Vec<bool> {
+            let down = |row: &Vec<bool>| row.get(contact) == Some(&true);
+            rows.iter().map(down).collect()
+        };
+        let tracks = names.iter().enumerate();
+        let tracks = tracks.map(|(contact, name)| (name, track(contact)));
+        let down: Vec<_> = tracks.filter(|(_, down)| down.contains(&true)).collect();
+        for (lane, (name, down)) in down.iter().enumerate() {
+            let y = top + LANE * lane as f64;
             self.text(WIDTH - RIGHT + 8.0, y + 13.0, "legend", name);
-            let down: Vec<bool> = rows
-                .iter()
-                .map(|row| row.get(contact) == Some(&true))
-                .collect();
-            for (from, to) in stretches(&down) {
+            for (from, to) in stretches(down) {
                 let (x, width) = (self.x(from), self.x(to) - self.x(from));
-                let color = COLORS[contact % COLORS.len()];
+                let color = COLORS[lane % COLORS.len()];
                 let height = LANE - 6.0;
                 self.draw(format!(
                     r#"<rect x="{x:.1}" y="{:.1}" width="{width:.1}" height="{height}" rx="2" fill="{color}"/>"#,
@@ -108,7 +111,7 @@ impl Sheet {
                 ));
             }
         }
-        let height = LANE * names.len().max(1) as f64;
+        let height = LANE * down.len().max(1) as f64;
         self.frame(height);
         self.y = top + height + GAP;
     }

@@ -130,6 +130,17 @@ impl Recording {
         agent.into_iter().chain([("reference", &self.reference)])
     }
 
+    /// Numbers of the contact parts with which some character touches the ground in some frame.
+    pub fn contacts(&self) -> Vec<usize> {
+        let touches = |contact: usize| {
+            let down = |frame: &Vec<bool>| frame.get(contact) == Some(&true);
+            self.actors()
+                .any(|(_, actor)| actor.contact.iter().any(down))
+        };
+        let parts = 0..self.contact_parts.len();
+        parts.filter(|contact| touches(*contact)).collect()
+    }
+
     /// Name of contact part number `contact`.
     pub fn name_of_contact(&self, contact: usize) -> String {
         let part = self

@@ -153,7 +153,12 @@ fn text(report: &Report) -> String {
     ] {
         writeln!(text, "{name:32} {min:9.2} {mean:9.2} {max:9.2}").ok();
     }
-    for ContactShare { body, share } in &summary.contacts {
+    // Every body may touch the ground; most never do.
+    let down = summary
+        .contacts
+        .iter()
+        .filter(|contact| contact.share > 0.0);
+    for ContactShare { body, share } in down {
         let name = plain(&format!("{body} on the ground"));
         writeln!(text, "{name:32} {:>8.0} %", 100.0 * share).ok();
     }

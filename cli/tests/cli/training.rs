@@ -277,7 +277,7 @@ fn a_published_preset_trains_on_its_character() {
         "ppo.minibatch=64",
     ];
     for (preset, skeleton, observation, kernels) in [
-        ("deepmimic", "humanoid", 167, "deepmimic-program"),
+        ("deepmimic", "humanoid", 193, "deepmimic-program"),
         ("deepmimic2018", "humanoid", 227, "deepmimic"),
         ("booth2020", "marathon", 258, "booth2020"),
     ] {

@@ -14,9 +14,10 @@ use crate::skeleton::GRAVITY;
 use nalgebra::{Point3, Vector3};
 
 /// A flight falls at least half as fast as it should: slower ones are steps with feet that float, or slow motion. So it is
-/// off its parabola by at most this share of the height to which the flight rises …
+/// below its parabola by at most this share of the height to which the flight rises …
 const SLOWEST: f64 = 0.5;
-/// … and by no more than this in any case, leg lengths. Chosen, as are the others …
+/// … and off it by no more than this in any case, leg lengths. One that is above its parabola is a flight that was drawn too
+/// high, or played too fast. Chosen, as are the others …
 const FARTHEST: f64 = 0.35;
 /// … and one that is off by less than this is corrected whatever its height, leg lengths.
 const CLOSE: f64 = 0.04;
@@ -86,9 +87,10 @@ pub(super) fn off_parabola(
     // The height above the chord of a flight of this duration: g T²/8.
     let rise = GRAVITY * duration * duration / 8.0;
     // How far off is still the same flight in another time or size, and not another motion.
-    let most = (SLOWEST * rise).min(FARTHEST * leg).max(CLOSE * leg);
+    let most = |share: f64| (share * rise).min(FARTHEST * leg).max(CLOSE * leg);
     let farthest = off.iter().map(Vector3::norm).fold(0.0, f64::max);
-    (farthest <= most).then_some(off)
+    let below = off.iter().map(|by| by.z).fold(0.0, f64::max);
+    (farthest <= most(f64::INFINITY) && below <= most(SLOWEST)).then_some(off)
 }
 
 /// A flight's shifts, and those before and after it that lead to and from their speed.

@@ -14,9 +14,8 @@ use crate::retarget::fade::smoothstep;
 use crate::retarget::model::Model;
 use nalgebra::Vector3;
 
-/// Height above the ground up to which a body may carry, leg lengths: feet, hands, and all others. Chosen: feet that are higher
-/// fly, while hands of a fast flair were 12 cm above their floor.
-const FOOT: f64 = 0.06;
+/// Height above the ground up to which a body may carry, leg lengths: hands, and all others. Chosen: hands of a fast flair were
+/// 12 cm above their floor. Feet are not led down, for those that carry stand, or leave the ground and come back to it.
 const HAND: f64 = 0.15;
 const TRUNK: f64 = 0.1;
 /// Time around its stance in which a foot or hand carries nothing else, s: the force of a landing is smeared over as much.
@@ -87,10 +86,10 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
         let mut found = slots.iter().filter_map(|slot| skeleton.slots.get(slot));
         found.any(|b| *b == body)
     };
-    let is_foot = |body: &usize| is_in([Slot::LeftFoot, Slot::RightFoot], *body);
-    let is_hand = |body: &usize| is_in([Slot::LeftHand, Slot::RightHand], *body);
-    let reach = |body: &usize| match (is_foot(body), is_hand(body)) {
-        (true, _) => FOOT * leg,
+    let feet = [Slot::LeftFoot, Slot::RightFoot];
+    let hands = [Slot::LeftHand, Slot::RightHand];
+    let reach = |body: &usize| match (is_in(feet, *body), is_in(hands, *body)) {
+        (true, _) => f64::NEG_INFINITY,
         (_, true) => HAND * leg,
         _ => TRUNK * leg,
     };
@@ -106,9 +105,7 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
         let [before, after] = nearest(&stands[..frames.len()], fit.cycle.is_some());
         for f in 0..frames.len() {
             let mut around = [before[f], after[f]].into_iter().flatten();
-            // A foot beside one that stands is on its way, and not to be put down.
-            let is_step = is_foot(&body) && fit.anchors[f].iter().any(Anchor::is_contact);
-            carries[f][c] &= !is_step && around.all(|(away, _)| away > near);
+            carries[f][c] &= around.all(|(away, _)| away > near);
         }
     }
     put_down(fit, frames, bodies, &found.need, &mut carries);
@@ -151,7 +148,7 @@ fn put_down(
 }
 
 /// Whether a body stands on one of these anchors.
-fn stands(model: &Model, anchors: &[Anchor], body: usize) -> bool {
+pub(super) fn stands(model: &Model, anchors: &[Anchor], body: usize) -> bool {
     let mut on = anchors.iter();
     on.any(|a| a.is_contact() && model.contact_points[a.point].body == body)
 }

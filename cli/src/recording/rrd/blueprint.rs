@@ -69,7 +69,7 @@ fn plots(layout: &Layout, shown: &Recording) -> RecordingStreamResult<Vec<(Strin
         plots.push((view, 3.6));
     }
     // A lane for every body of every character, and the heading.
-    let lanes = 0.6 + 0.45 * (shown.contact_parts.len() * shown.actors().count()) as f32;
+    let lanes = 0.6 + 0.45 * (shown.contacts().len() * shown.actors().count()) as f32;
     let contacts = layout.view(3, "StateTimeline", "ground contact", "plots/contacts")?;
     plots.push((contacts, lanes));
     let height = "height of the centre of mass, m";

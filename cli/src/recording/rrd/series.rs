@@ -70,14 +70,14 @@ fn line(
     stream.send_columns(path, times.to_vec(), columns)
 }
 
-/// Draws a lane for every body that may touch the ground, filled while it does.
+/// Draws a lane for every body that ever touches the ground, filled while it does.
 fn contacts(
     stream: &RecordingStream,
     shown: &Recording,
     times: &[TimeColumn],
 ) -> RecordingStreamResult<()> {
     for (name, actor) in shown.actors() {
-        for contact in 0..shown.contact_parts.len() {
+        for contact in shown.contacts() {
             let path = format!("plots/contacts/{}/{name}", shown.name_of_contact(contact));
             let style = StateConfiguration::new()
                 .with_values([DOWN])

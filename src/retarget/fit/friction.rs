@@ -1,0 +1,200 @@
+//! Friction: the ground pushes a body sideways only as hard as it is pressed.
+//!
+//! In clips of games the hips often stay where they are while everything else swings around them, and feet slide along. No
+//! ground could hurl a body about like that. For a body that is to perform the motion, the whole of it is led along a smoother
+//! way: the swing is taken out of the centre of mass and put into the hips.
+
+use super::Fit;
+use crate::clip::LoopMode;
+use crate::motion::{Cycle, Draft, Motion};
+use crate::skeleton::GRAVITY;
+use nalgebra::Vector2;
+use std::f64::consts::TAU;
+
+/// Sideways force without which the motion does that no contact supplies, as a share of the weight; only what is beyond it is
+/// taken out. Chosen: recordings of people need up to a tenth.
+const ALLOWED: f64 = 0.25;
+/// Swings that are quicker than this are taken out, slower ones are left, s: a slow swing would move the body far. Chosen.
+const PERIOD: f64 = 1.0;
+/// Longest shift that is made, leg lengths.
+const FARTHEST: f64 = 0.15;
+/// Steps of the method of conjugate gradients.
+const STEPS: usize = 400;
+
+/// How every frame is shifted over the ground, metres; `None` where the ground can push as the motion asks.
+pub(super) fn shifts(fit: &Fit, frames: &[Vec<f64>]) -> Option<Vec<Vector2<f64>>> {
+    // A cycle that turns would turn the shifts from one to the next.
+    if fit.cycle.is_some_and(|cycle| cycle.heading.abs() > 1e-6) {
+        return None;
+    }
+    let lacking = lacking(fit, frames);
+    if lacking.iter().all(|a| *a == Vector2::zeros()) {
+        return None;
+    }
+    let way = Way {
+        repeats: fit.cycle.is_some(),
+        rate: fit.fps * fit.fps,
+        // A swing of this period is taken out half.
+        hold: (TAU / PERIOD).powi(4),
+    };
+    let most = FARTHEST * fit.model.skeleton.leg_length();
+    let mut shifts = way.solve(&lacking);
+    let farthest = shifts.iter().map(|s| s.norm()).fold(0.0, f64::max);
+    if farthest > most {
+        shifts.iter_mut().for_each(|s| *s *= most / farthest);
+    }
+    Some(shifts)
+}
+
+/// The sideways acceleration that no contact supplies beyond what is allowed, by frame, m/s².
+fn lacking(fit: &Fit, frames: &[Vec<f64>]) -> Vec<Vector2<f64>> {
+    let skeleton = fit.model.skeleton;
+    let bodies = skeleton.contact_bodies();
+    let qpos = fit.whole_cycle(frames.to_vec());
+    let stands = |frame: &Vec<_>| {
+        let on = |body: &usize| super::carriers::stands(fit.model, frame, *body);
+        bodies.iter().map(on).collect()
+    };
+    let contact = (0..qpos.len()).map(|f| stands(&fit.anchors[f % fit.anchors.len()]));
+    let motion = Motion::from_poses(
+        skeleton,
+        Draft {
+            name: String::new(),
+            fps: fit.fps,
+            loop_mode: match fit.cycle {
+                Some(_) => LoopMode::Wrap,
+                None => LoopMode::Clamp,
+            },
+            cycle: fit.cycle.copied().unwrap_or(Cycle::NONE),
+            contact: Some(contact.collect()),
+            qpos,
+            contact_bodies: bodies.clone(),
+        },
+    );
+    let beyond = |force: Vector2<f64>| {
+        let acceleration = force / skeleton.total_mass();
+        let size = acceleration.norm();
+        let left = (size - ALLOWED * GRAVITY).max(0.0);
+        acceleration * (left / size.max(f64::MIN_POSITIVE))
+    };
+    // What flies is led along a parabola, and that is another stage's work.
+    let lacking = |f: usize| {
+        let wrench = &motion.tracks.root_wrench_residual[f];
+        match motion.tracks.contact[f].contains(&true) {
+            true => beyond(Vector2::new(wrench[0], wrench[1])),
+            false => Vector2::zeros(),
+        }
+    };
+    (0..frames.len()).map(lacking).collect()
+}
+
+/// The least-squares problem of a way: its accelerations take out what is lacking, and it stays near.
+struct Way {
+    repeats: bool,
+    /// Frames per second, squared.
+    rate: f64,
+    /// Weight of a shift's square beside that of an acceleration, 1/s⁴.
+    hold: f64,
+}
+
+impl Way {
+    /// The shifts s that minimise Σ ‖s̈ + lacking‖² + hold ‖s‖².
+    fn solve(&self, lacking: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
+        let mut shifts = vec![Vector2::zeros(); lacking.len()];
+        // Conjugate gradients of Hestenes and Stiefel (1952) on (DᵀD + hold) s = −Dᵀ lacking, both axes at once.
+        let wanted: Vec<_> = lacking.iter().map(|a| -a).collect();
+        let mut rest = self.transposed(&wanted);
+        let mut way = rest.clone();
+        let mut size = square(&rest);
+        let enough = 1e-12 * size;
+        for _ in 0..STEPS {
+            if size <= enough {
+                break;
+            }
+            let ahead = self.normal(&way);
+            let step = size / dot(&way, &ahead);
+            for i in 0..shifts.len() {
+                shifts[i] += way[i] * step;
+                rest[i] -= ahead[i] * step;
+            }
+            let next = square(&rest);
+            let turn = next / size;
+            way.iter_mut()
+                .zip(&rest)
+                .for_each(|(w, r)| *w = r + *w * turn);
+            size = next;
+        }
+        shifts
+    }
+
+    /// (DᵀD + hold) s.
+    fn normal(&self, s: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
+        let mut out = self.transposed(&self.acceleration(s));
+        out.iter_mut().zip(s).for_each(|(o, s)| *o += s * self.hold);
+        out
+    }
+
+    /// D s: second differences. A way that ends has none at its ends.
+    fn acceleration(&self, s: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
+        let mut out = vec![Vector2::zeros(); s.len()];
+        for (before, f, after) in self.triples(s.len()) {
+            out[f] = (s[before] - s[f] * 2.0 + s[after]) * self.rate;
+        }
+        out
+    }
+
+    /// Dᵀ a.
+    fn transposed(&self, a: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
+        let mut out = vec![Vector2::zeros(); a.len()];
+        for (before, f, after) in self.triples(a.len()) {
+            let part = a[f] * self.rate;
+            out[before] += part;
+            out[f] -= part * 2.0;
+            out[after] += part;
+        }
+        out
+    }
+
+    /// Every frame that has neighbours, between them.
+    fn triples(&self, count: usize) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
+        let inner = match self.repeats {
+            true => 0..count,
+            false => 1..count.saturating_sub(1).max(1),
+        };
+        inner.map(move |f| ((f + count - 1) % count, f, (f + 1) % count))
+    }
+}
+
+fn dot(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+fn square(a: &[Vector2<f64>]) -> f64 {
+    dot(a, a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quick swing is taken out, a slow one is left: s = ρ ω²/(ω⁴ + hold).
+    #[test]
+    fn quick_swings_are_taken_out() {
+        let fps = 60.0;
+        let way = Way {
+            repeats: true,
+            rate: fps * fps,
+            hold: (TAU / PERIOD).powi(4),
+        };
+        for (period, frames) in [(0.4, 24), (2.0, 120)] {
+            let omega: f64 = TAU / period;
+            let swing = |f: usize| Vector2::new((omega * f as f64 / fps).sin(), 0.0);
+            let lacking: Vec<_> = (0..frames).map(swing).collect();
+            let found = way.solve(&lacking);
+            let expected = omega.powi(2) / (omega.powi(4) + way.hold);
+            for (s, a) in found.iter().zip(&lacking) {
+                assert!((s - a * expected).norm() < 0.02 * expected, "{s} {a}");
+            }
+        }
+    }
+}
