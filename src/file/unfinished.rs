@@ -1,7 +1,9 @@
 //! Files that are being written, under a name of their own beside the one that they will have.
 
+use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fs::{DirEntry, File};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process;
@@ -9,11 +11,11 @@ use std::sync::Mutex;
 use std::time::Duration;
 use tempfile::{Builder, NamedTempFile};
 
-/// What the names of unfinished files begin with. The number of the process that writes follows, then a dash and
-/// [`RANDOM`] letters.
+/// What the names of unfinished files begin with. The number of the process that writes follows, then a dash and a random
+/// number, a dash and the [`seal`] of the two: nobody gives a file of their own such a name, by accident or by guessing.
 pub(super) const PREFIX: &str = ".mimic-";
-/// Random letters at the end of such a name.
-const RANDOM: usize = 6;
+/// How often a name is tried that is taken: among 2⁶⁴ none is.
+const TRIES: usize = 8;
 /// Age from which an unfinished file counts as left behind although a process of its number runs, or may run where the
 /// system doesn't say. Chosen: writing takes seconds, and numbers of processes are used again.
 const STALE: Duration = Duration::from_secs(3600);
@@ -38,13 +40,7 @@ impl Unfinished {
             .filter(|parent| !parent.as_os_str().is_empty())
             .unwrap_or(Path::new("."));
         sweep_once(folder);
-        let prefix = format!("{PREFIX}{}-", process::id());
-        let mut builder = Builder::new();
-        builder.prefix(&prefix).rand_bytes(RANDOM);
-        // Temporary files are private by default; this one becomes a file like any other.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let file = builder.tempfile_in(folder).map_err(unnamed)?;
+        let file = named(folder).map_err(unnamed)?;
         // Says to other machines that share the folder that somebody writes. Windows would keep a second handle of our
         // own from writing, and some file systems know no locks.
         #[cfg(unix)]
@@ -86,6 +82,36 @@ impl Unfinished {
             Err(_) => Err(io::ErrorKind::AlreadyExists.into()),
         }
     }
+}
+
+/// A new file in `folder`.
+fn named(folder: &Path) -> io::Result<NamedTempFile> {
+    let new = || {
+        let name = name(process::id(), RandomState::new().build_hasher().finish());
+        let mut builder = Builder::new();
+        builder.prefix(&name).rand_bytes(0);
+        // Temporary files are private by default; this one becomes a file like any other.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        builder.tempfile_in(folder)
+    };
+    let is_taken = |made: &io::Result<NamedTempFile>| matches!(made, Err(e) if e.kind() == io::ErrorKind::AlreadyExists);
+    (1..TRIES).fold(new(), |made, _| match is_taken(&made) {
+        true => new(),
+        false => made,
+    })
+}
+
+/// The name of an unfinished file of this process.
+fn name(process: u32, random: u64) -> String {
+    let own = format!("{process}-{random:016x}");
+    format!("{PREFIX}{own}-{}", seal(&own))
+}
+
+/// Shows that a name is of our making: the beginning of a digest, long enough that chance doesn't meet it.
+fn seal(own: &str) -> String {
+    let digest = Sha256::digest(format!("an unfinished file of mimic, {own}"));
+    format!("{digest:x}").split_off(48)
 }
 
 /// Whether anything has this name, be it a link that leads nowhere.
@@ -142,9 +168,9 @@ fn is_left_behind(entry: &DirEntry) -> bool {
 
 /// The process whose unfinished file has this name.
 pub(super) fn writer_of(name: &str) -> Option<u32> {
-    let (process, letters) = name.strip_prefix(PREFIX)?.split_once('-')?;
-    let random = letters.len() == RANDOM && letters.chars().all(|c| c.is_ascii_alphanumeric());
-    process.parse().ok().filter(|_| random)
+    let (own, sealed) = name.strip_prefix(PREFIX)?.rsplit_once('-')?;
+    let (process, _) = own.split_once('-')?;
+    process.parse().ok().filter(|_| seal(own) == sealed)
 }
 
 /// Whether no process of this number runs. Where the system doesn't list processes as files, none counts as ended.
@@ -176,28 +202,38 @@ mod tests {
         // Numbers of processes end at 2^22.
         let dead = 4_000_000_000_u32;
         let own = process::id();
+        let left = |process| name(process, 7);
         let others = [
             ".mimic-notes".to_owned(),
             ".mimic-backup".to_owned(),
             format!(".mimic-{dead}-notes"),
             format!(".mimic-{dead}-abcde_"),
             format!("mimic-{dead}-abcdef"),
-            format!(".mimic-{own}-abcdef"),
+            // What people write whose tool has our name.
+            ".mimic-2024-backup".to_owned(),
+            ".mimic-99999-config".to_owned(),
+            format!(".mimic-{dead}-abcdef"),
+            format!(".mimic-{dead}-0123456789abcdef-0123456789abcdef"),
+            format!("{}0", left(dead)),
+            format!("{}.bak", left(dead)),
+            left(dead).replacen("0007", "0008", 1),
+            left(own),
         ];
         for name in &others {
             std::fs::write(at(name), b"kept").expect("written");
         }
-        std::fs::create_dir(at(&format!(".mimic-{dead}-folder"))).expect("a folder");
-        let locked = format!(".mimic-{dead}-locked");
+        let folder_name = name(dead, 1);
+        std::fs::create_dir(at(&folder_name)).expect("a folder");
+        let locked = name(dead, 2);
         let held = File::create(at(&locked)).expect("written");
         held.lock().expect("locked");
-        let old = format!(".mimic-{own}-aged00");
+        let old = name(own, 3);
         let aged = File::create(at(&old)).expect("written");
         aged.set_modified(SystemTime::now() - 2 * STALE)
             .expect("aged");
-        std::fs::write(at(&format!(".mimic-{dead}-abcdef")), b"left").expect("written");
+        std::fs::write(at(&left(dead)), b"left").expect("written");
         let mut kept = others.to_vec();
-        kept.extend([locked, format!(".mimic-{dead}-folder")]);
+        kept.extend([locked, folder_name]);
         kept.sort();
         let mut file = Unfinished::beside(at("new.txt")).expect("made");
         file.file().write_all(b"new").expect("written");

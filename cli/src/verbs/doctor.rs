@@ -4,8 +4,10 @@ use crate::failure::{Failure, Outcome};
 use crate::printer::Printer;
 use crate::recording;
 use crate::viewer::{self, Viewer};
+use mimic::file::Unfinished;
 use serde::Serialize;
 use serde_json::json;
+use std::io::Write;
 use std::path::Path;
 
 const EXAMPLES: &str = "\
@@ -112,8 +114,9 @@ fn yes(flag: bool) -> &'static str {
 
 /// Shows by writing a file that this folder can hold results.
 fn folder() -> Check {
-    let probe = format!(".mimic-doctor-{}", std::process::id());
-    let written = std::fs::write(&probe, b"mimic").and_then(|()| std::fs::remove_file(&probe));
+    // Under a name that no file of the user has.
+    let probe = Unfinished::beside("doctor");
+    let written = probe.and_then(|mut probe| probe.file().write_all(b"mimic"));
     let here = std::env::current_dir().unwrap_or_default();
     Check {
         id: "folder",
