@@ -16,6 +16,7 @@ mod progress;
 mod recording;
 mod runs;
 mod shell;
+mod signals;
 mod verbs;
 mod viewer;
 
@@ -25,6 +26,7 @@ use printer::Printer;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    signals::report_large_files();
     if let Some(code) = verbs::completions::answer(Cli::command) {
         return code;
     }

@@ -2,7 +2,7 @@
 
 use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// The file in a folder that is locked. It stays when the lock ends, because two processes could lock two files of one name
@@ -20,7 +20,9 @@ const MOST_BYTES: u64 = 64;
 #[derive(Debug)]
 pub struct Lock {
     /// Open as long as the lock lasts.
-    _file: File,
+    file: File,
+    /// Where it was when it was locked.
+    path: PathBuf,
 }
 
 /// Why a folder can't be locked.
@@ -55,7 +57,7 @@ impl Lock {
                 Ok(()) if is_at(&file, &path) => {
                     // Who holds the folder is told as a courtesy: the lock holds without it.
                     sign(&mut file).ok();
-                    return Ok(Self { _file: file });
+                    return Ok(Self { file, path });
                 }
                 // Its folder was given up and removed while we waited.
                 Ok(()) => {}
@@ -65,11 +67,17 @@ impl Lock {
                 Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
                 // Some network file systems know no locks. Working there without one beats not working there.
                 Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {
-                    return Ok(Self { _file: file });
+                    return Ok(Self { file, path });
                 }
                 Err(TryLockError::Error(e)) => return Err(LockError::System(e)),
             }
         }
+    }
+
+    /// Whether the folder's path still leads to the folder that was locked. A folder can be moved away, and another one can
+    /// take its place: the lock goes with the first.
+    pub fn is_in_place(&self) -> bool {
+        is_at(&self.file, &self.path)
     }
 
     /// Who holds the folder at this moment; `None` if nobody does.
@@ -236,5 +244,29 @@ mod tests {
         assert!(matches!(Lock::take(&run), Err(LockError::System(_))));
         assert_eq!(Lock::holder(&run), None);
         assert_eq!(std::fs::read_to_string(&elsewhere).expect("read"), "kept");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_goes_with_its_folder() {
+        let all = tempfile::tempdir().expect("a folder");
+        let [here, there] = ["here", "there"].map(|name| all.path().join(name));
+        let remade = |path: &Path| {
+            std::fs::create_dir(path).expect("a folder");
+            Lock::take(path).expect("nobody holds it")
+        };
+        let first = remade(&here);
+        assert!(first.is_in_place());
+        std::fs::rename(&here, &there).expect("moved");
+        assert!(!first.is_in_place(), "nothing is there");
+        let second = remade(&here);
+        assert!(!first.is_in_place() && second.is_in_place());
+        std::fs::remove_dir_all(&here).expect("removed");
+        std::fs::rename(&there, &here).expect("moved back");
+        assert!(first.is_in_place() && !second.is_in_place());
+        // By another way to the same folder, too.
+        std::fs::rename(&here, &there).expect("moved");
+        std::os::unix::fs::symlink(&there, &here).expect("a link");
+        assert!(first.is_in_place());
     }
 }

@@ -17,7 +17,7 @@ pub use error::{FileError, Flaw};
 pub use format::Format;
 pub use lock::{Holder, LOCK, Lock, LockError};
 pub use made::{holds, made_by};
-pub use read::{read_at_most, text_at_most, unread};
+pub use read::{lines_at_most, read_at_most, start_of, text_at_most, unread};
 pub(crate) use tensors::{Reader, Writer, format_of, load, save};
 pub use unfinished::Unfinished;
 pub use unwritten::unwritten;

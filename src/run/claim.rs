@@ -11,17 +11,79 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A folder that is empty, and held by this process until a run is made in it. A claim that is dropped leaves nothing.
 #[derive(Debug)]
 pub struct Claim {
     dir: PathBuf,
+    /// `None` once a run has taken it over.
+    held: Option<Arc<Held>>,
+}
+
+/// A folder that this process holds.
+#[derive(Debug)]
+pub(super) struct Held {
+    dir: PathBuf,
     /// The folders that were made for it, the innermost first.
     made: Vec<PathBuf>,
-    /// `None` once a run has taken it over.
-    lock: Option<Lock>,
-    /// Whether files of a run were written. Before that, what is there is somebody's.
-    written: bool,
+    lock: Lock,
+    /// Whether this process wrote the files of a run. Before that, what is there is somebody's.
+    written: AtomicBool,
+}
+
+/// What a new run leaves behind if nothing of it is ever saved. Whoever ends the program can remove it from anywhere. As long
+/// as this exists, the folder stays locked.
+#[derive(Clone, Debug)]
+pub struct Unsaved(Option<Arc<Held>>);
+
+impl Unsaved {
+    /// Removes the run, and the folders that were made for it. A run that was saved stays, and so does one that was there
+    /// before, or whose folder isn't where it was.
+    pub fn remove(self) {
+        if let Some(held) = self.0 {
+            held.clear();
+        }
+    }
+}
+
+impl Held {
+    /// Locks the folder `dir`, in which there may be a run.
+    pub(super) fn take(dir: &Path, made: Vec<PathBuf>) -> Result<Self, RunError> {
+        Ok(Self {
+            dir: dir.to_owned(),
+            made,
+            lock: Lock::take(dir).map_err(|e| RunError::locked(dir, e))?,
+            written: AtomicBool::new(false),
+        })
+    }
+
+    /// Checks that the path still leads to the folder that is held. What another process puts in its place isn't ours.
+    pub(super) fn check(&self) -> Result<(), RunError> {
+        match self.lock.is_in_place() {
+            true => Ok(()),
+            false => Err(RunError::Moved(self.dir.clone())),
+        }
+    }
+
+    /// Removes what was made here, unless there is something to go on from.
+    fn clear(&self) {
+        if self.check().is_err() || self.dir.join(files::CHECKPOINT).exists() {
+            return;
+        }
+        let written = self.written.load(Ordering::SeqCst);
+        if !written && self.dir.join(files::CONFIG).exists() {
+            return;
+        }
+        remove(&self.dir, |name| {
+            name == LOCK || written && files::is_own(name)
+        });
+        for folder in &self.made {
+            // Folders with something in them stay.
+            fs::remove_dir(folder).ok();
+        }
+    }
 }
 
 impl Claim {
@@ -36,9 +98,7 @@ impl Claim {
         check_empty(dir)?;
         let claim = Self {
             dir: dir.to_owned(),
-            made,
-            lock: Some(Lock::take(dir).map_err(|e| RunError::locked(dir, e))?),
-            written: false,
+            held: Some(Arc::new(Held::take(dir, made)?)),
         };
         match check_empty(dir) {
             Ok(()) => Ok(claim),
@@ -52,6 +112,11 @@ impl Claim {
     /// The folder.
     pub fn dir(&self) -> &Path {
         &self.dir
+    }
+
+    /// What is to be removed if the program has to end while the run is made.
+    pub fn unsaved(&self) -> Unsaved {
+        Unsaved(self.held.clone())
     }
 
     /// Makes a run in the folder.
@@ -72,9 +137,12 @@ impl Claim {
         };
         let motions: Vec<Motion> = motions.into_iter().map(whole).collect();
         check(&plan, &skeleton, &motions)?;
-        // What a killed process left gives way now that a run will take its place.
-        remove(&self.dir, |name| name != LOCK && files::is_own(name));
-        self.written = true;
+        if let Some(held) = &self.held {
+            held.check()?;
+            // What a killed process left gives way now that a run will take its place.
+            remove(&self.dir, |name| name != LOCK && files::is_own(name));
+            held.written.store(true, Ordering::SeqCst);
+        }
         let write = |name: &str, text: &str| super::folder::write(&self.dir.join(name), text);
         write(files::SKELETON, &skeleton.mjcf)?;
         write(files::SLOTS, &skeleton.slots_json())?;
@@ -86,24 +154,19 @@ impl Claim {
         write(files::CONFIG, &config.text(&self.dir)?)?;
         // Files hold single precision: only what is read back from them is learned, so that a resumed run sees the same.
         let mut run = Run::open(&self.dir)?;
-        run.lock = self.lock.take();
+        run.held = self.held.take();
         Ok(run)
     }
 
     /// Ends the claim on a folder that turned out to belong to somebody else.
     fn give_up(mut self) {
-        self.lock = None;
+        self.held = None;
     }
 }
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        if let Some(lock) = self.lock.take() {
-            let written = self.written;
-            clear(&self.dir, lock, &self.made, |name| {
-                name == LOCK || written && files::is_own(name)
-            });
-        }
+        Unsaved(self.held.take()).remove();
     }
 }
 
@@ -121,19 +184,9 @@ impl Run {
         Claim::on(dir)?.create(plan, skeleton, motions)
     }
 
-    /// Removes the run in `dir` if it never was saved: there is nothing in it to go on from. A run with a checkpoint stays,
-    /// and so does one that another process trains.
-    pub fn discard(dir: impl AsRef<Path>) {
-        let dir = dir.as_ref();
-        let is_there = |name| dir.join(name).exists();
-        let unsaved = || is_there(files::CONFIG) && !is_there(files::CHECKPOINT);
-        if !unsaved() {
-            return;
-        }
-        // Only under the lock is it sure that nobody saves.
-        if let Some(lock) = Lock::take(dir).ok().filter(|_| unsaved()) {
-            clear(dir, lock, &[dir.to_owned()], files::is_own);
-        }
+    /// What is to be removed if nothing of this run is ever saved; nothing of a run that was opened.
+    pub fn unsaved(&self) -> Unsaved {
+        Unsaved(self.held.clone())
     }
 }
 
@@ -185,15 +238,6 @@ fn check_empty(dir: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Removes the files in a folder that are `meant`, and then the folders that were `made`. Folders with something in them stay.
-fn clear(dir: &Path, lock: Lock, made: &[PathBuf], meant: impl Fn(&OsStr) -> bool) {
-    remove(dir, meant);
-    drop(lock);
-    for folder in made {
-        fs::remove_dir(folder).ok();
-    }
-}
-
 /// Removes files of a run, by their names. What can't be removed stays: what goes on here meets it, and says more.
 fn remove(dir: &Path, meant: impl Fn(&OsStr) -> bool) {
     for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
@@ -235,7 +279,6 @@ mod tests {
             assert!(matches!(&error, RunError::NoFolder(found) if *found == file));
             assert_eq!(error.is_taken(&dir), dir == file);
         }
-        Run::discard(folder.path().join("missing"));
         assert_eq!(fs::read_to_string(&file).expect("read"), "mine");
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
     }

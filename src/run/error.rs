@@ -40,12 +40,23 @@ pub enum RunError {
         /// Who holds it.
         holder: Holder,
     },
+    /// The run's path no longer leads to the folder that this process holds.
+    Moved(PathBuf),
     /// A folder that isn't a run.
     NoRun(PathBuf),
     /// A run without a policy: it was never saved.
     NoPolicy(PathBuf),
+    /// The same, while another process trains it.
+    NoPolicyYet(PathBuf),
     /// A file of the run whose content can't be used.
     Config {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An evaluation of a run that can't be used.
+    NoEvaluation {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
@@ -174,6 +185,11 @@ impl Explain for RunError {
                     .file(path)
                     .remedy("wait until it ends, or stop it")
             }
+            Self::Moved(path) => Explanation::work(
+                "the folder of this run was moved or replaced while it was in use, so nothing more is written here",
+            )
+            .file(path)
+            .remedy("resume the run where its folder is now; it goes on from its last checkpoint"),
             Self::NoRun(path) => {
                 Explanation::input("this is not a run: there is no config.json in it")
                     .file(path)
@@ -182,9 +198,19 @@ impl Explain for RunError {
             Self::NoPolicy(path) => Explanation::input("this run has no policy")
                 .file(path)
                 .remedy("resume its training, which makes the policy"),
+            Self::NoPolicyYet(path) => Explanation::input(
+                "this run has no policy yet, and another process trains it",
+            )
+            .file(path)
+            .remedy("wait for the end of its first round"),
             Self::Config { path, reason } => Explanation::input(reason)
                 .file(path)
                 .remedy("correct the file, or train a new run"),
+            Self::NoEvaluation { path, reason } => {
+                Explanation::input(format!("this is not an evaluation ({reason})"))
+                    .file(path)
+                    .remedy("evaluate the run again, which replaces the file")
+            }
             Self::File(error) => error.explain(),
             Self::Motion(error) => error.explain(),
             Self::Skeleton(error) => error.explain(),

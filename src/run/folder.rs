@@ -1,15 +1,19 @@
 //! The folder of a run: everything needed to resume, replay and reproduce it.
 
 use super::checkpoint::{Checkpoint, PolicyFile};
+use super::claim::Held;
 use super::controller::Controller;
 use super::error::RunError;
 use super::files;
 use super::plan::Plan;
+use crate::evaluate::{Options, longest};
 use crate::file::{Flaw, Format, Lock, text_at_most};
-use crate::learn::{Metrics, Policy, PolicySpec, Trainer, TrainerState};
+use crate::learn::{Policy, PolicySpec, Trainer, TrainerState};
 use crate::motion::Motion;
 use crate::skeleton::Skeleton;
-use crate::task::{Block, CharacterModel, Task, TaskSettings, size};
+use crate::task::{
+    Block, Case, CharacterModel, Perturbations, Task, TaskError, TaskSettings, size,
+};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -66,11 +70,18 @@ impl RunConfig {
     }
 }
 
+/// What is read of a line of `metrics.jsonl`. Whatever else is there is passed over, and takes no memory.
+#[derive(Deserialize)]
+struct Line {
+    iteration: u64,
+    seconds: Option<f64>,
+}
+
 /// A training run on disk.
 pub struct Run {
     dir: PathBuf,
     /// Held while the run is trained.
-    pub(super) lock: Option<Lock>,
+    pub(super) held: Option<Arc<Held>>,
     plan: Plan,
     skeleton: Skeleton,
     motions: Vec<Motion>,
@@ -78,7 +89,7 @@ pub struct Run {
 
 /// Most bytes that are read of the run's short files, and of its metrics. Chosen: a hundred times what is written of a plan or
 /// a character, and as many lines as two billion samples make by the default.
-const MOST_BYTES: u64 = 4 << 20;
+const MOST_BYTES: u64 = 1 << 20;
 const MOST_METRICS: u64 = 1 << 30;
 
 /// Tensor of the checkpoint that says where episodes begin.
@@ -104,7 +115,7 @@ impl Run {
         }
         Ok(Run {
             dir: dir.to_owned(),
-            lock: None,
+            held: None,
             plan: config.plan,
             skeleton: Skeleton::from_mjcf(&config.skeleton, &mjcf, Some(&slots))
                 .map_err(|e| e.in_files(&dir.join(files::SKELETON), &dir.join(files::SLOTS)))
@@ -143,11 +154,25 @@ impl Run {
     /// # Errors
     /// A run that another process holds, or a folder that can't be written.
     pub fn hold(&mut self) -> Result<(), RunError> {
-        if self.lock.is_none() {
-            let lock = Lock::take(&self.dir).map_err(|e| RunError::locked(&self.dir, e))?;
-            self.lock = Some(lock);
+        if self.held.is_none() {
+            self.held = Some(Arc::new(Held::take(&self.dir, Vec::new())?));
         }
         Ok(())
+    }
+
+    /// Checks, before anything is written, that the run's path still leads to the folder that this process holds. Another
+    /// folder in its place may be another run, which another process trains.
+    ///
+    /// # Errors
+    /// [`RunError::Moved`] where it doesn't.
+    pub fn check_place(&self) -> Result<(), RunError> {
+        self.held.as_ref().map_or(Ok(()), |held| held.check())
+    }
+
+    /// Writes, if the run's path leads where it should. A folder that is moved meanwhile makes an error of its own, which says less.
+    fn in_place(&self, write: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
+        self.check_place()?;
+        write().map_err(|error| self.check_place().err().unwrap_or(error))
     }
 
     /// A trainer that goes on from the last checkpoint, or begins if there is none.
@@ -156,6 +181,7 @@ impl Run {
     /// A plan that can't be trained, or a broken checkpoint.
     pub fn trainer(&self) -> Result<Trainer, RunError> {
         let task = build(&self.plan.task, &self.skeleton, &self.motions)?;
+        check_lengths(&self.plan, task.as_ref())?;
         let mut trainer = Trainer::new(self.plan.trainer(), task)?;
         let path = self.dir.join(files::CHECKPOINT);
         if path.symlink_metadata().is_err() {
@@ -226,7 +252,7 @@ impl Run {
             normalizer,
             tensors: [(STARTS.to_owned(), starts)].into(),
         };
-        checkpoint.save(self.dir.join(files::CHECKPOINT))?;
+        self.in_place(|| Ok(checkpoint.save(self.dir.join(files::CHECKPOINT))?))?;
         self.save_policy(trainer)
     }
 
@@ -252,7 +278,7 @@ impl Run {
                 observation: trainer.task().observation().to_vec(),
             }),
         };
-        Ok(policy.save(self.dir.join(files::POLICY))?)
+        self.in_place(|| Ok(policy.save(self.dir.join(files::POLICY))?))
     }
 
     /// Appends a line to `metrics.jsonl`: the metrics with the run's clock.
@@ -261,23 +287,22 @@ impl Run {
     /// A file that can't be written.
     pub fn log(&self, line: &Value) -> Result<(), RunError> {
         let path = self.dir.join(files::METRICS);
-        let mut file = fs::OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .map_err(unwritten(&path))?;
-        // In one piece, so that whoever reads along never finds half a line.
-        file.write_all(format!("{line}\n").as_bytes())
-            .map_err(unwritten(&path))
+        let mut options = fs::OpenOptions::new();
+        options.create(true).append(true);
+        self.in_place(|| {
+            let mut file = options.open(&path).map_err(unwritten(&path))?;
+            // In one piece, so that whoever reads along never finds half a line.
+            file.write_all(format!("{line}\n").as_bytes())
+                .map_err(unwritten(&path))
+        })
     }
 
     /// Seconds of training so far, from the last line of `metrics.jsonl`; 0 before there is one.
     pub fn seconds(&self) -> f64 {
         let text = read(&self.dir.join(files::METRICS), MOST_METRICS).unwrap_or_default();
         let last = text.lines().last();
-        let line = last.and_then(|line| serde_json::from_str::<Value>(line).ok());
-        line.and_then(|line| line["seconds"].as_f64())
-            .unwrap_or(0.0)
+        let line = last.and_then(|line| serde_json::from_str::<Line>(line).ok());
+        line.and_then(|line| line.seconds).unwrap_or(0.0)
     }
 
     /// Writes a file of the run, such as `eval.json`, in one step.
@@ -285,7 +310,7 @@ impl Run {
     /// # Errors
     /// A file that can't be written.
     pub fn write(&self, name: &str, text: &str) -> Result<(), RunError> {
-        write(&self.dir.join(name), text)
+        self.in_place(|| write(&self.dir.join(name), text))
     }
 
     /// The policy, ready to act.
@@ -295,7 +320,12 @@ impl Run {
     pub fn controller(&self) -> Result<Controller, RunError> {
         let path = self.dir.join(files::POLICY);
         if !path.exists() {
-            return Err(RunError::NoPolicy(self.dir.clone()));
+            let dir = self.dir.clone();
+            let is_trained = self.held.is_none() && Lock::holder(&dir).is_some();
+            return Err(match is_trained {
+                true => RunError::NoPolicyYet(dir),
+                false => RunError::NoPolicy(dir),
+            });
         }
         let file = PolicyFile::load(&path)?;
         let details: PolicyDetails =
@@ -316,8 +346,7 @@ impl Run {
             return Ok(());
         }
         let known = |line: &&str| {
-            serde_json::from_str::<Metrics>(line)
-                .is_ok_and(|metrics| metrics.iteration <= iteration)
+            serde_json::from_str::<Line>(line).is_ok_and(|line| line.iteration <= iteration)
         };
         let text = read(&path, MOST_METRICS)?;
         let kept: String = text
@@ -343,6 +372,7 @@ fn build(
 pub(super) fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), RunError> {
     plan.check()?;
     let task = build(&plan.task, skeleton, motions)?;
+    check_lengths(plan, task.as_ref())?;
     let spec = PolicySpec {
         observation: size(task.observation()),
         action: size(task.action()),
@@ -351,6 +381,25 @@ pub(super) fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Res
     };
     Policy::new(spec)?;
     Ok(())
+}
+
+/// Checks that what is learned can also be evaluated, by the default options: a run is finished by its evaluation.
+fn check_lengths(plan: &Plan, task: &dyn Task) -> Result<(), RunError> {
+    let perturbations = Some(*plan.task.perturbations()).filter(Perturbations::is_on);
+    let options = Options {
+        perturbations,
+        ..Options::default()
+    };
+    let most = longest(options.performed(), task.control_hz());
+    let too_long = |case: &&Case| case.duration_s.is_some_and(|seconds| seconds > most);
+    match task.cases().iter().find(too_long) {
+        Some(case) => Err(RunError::Task(TaskError::TooLong {
+            motion: case.name.clone(),
+            seconds: case.duration_s.unwrap_or_default(),
+            most,
+        })),
+        None => Ok(()),
+    }
 }
 
 /// Reads and checks the `config.json` at `path`.

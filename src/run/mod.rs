@@ -12,14 +12,16 @@ pub mod files;
 mod folder;
 mod plan;
 mod presets;
+mod scores;
 mod session;
 
 pub use checkpoint::{Checkpoint, PolicyFile};
-pub use claim::Claim;
+pub use claim::{Claim, Unsaved};
 pub use controller::{Controller, Memory};
 pub use error::RunError;
 pub use evaluation::CaseEvaluation;
 pub use folder::Run;
 pub use plan::Plan;
 pub use presets::{PRESETS, Preset, preset};
+pub use scores::Scores;
 pub use session::{Iteration, Session};

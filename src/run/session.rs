@@ -130,7 +130,7 @@ impl Session {
     /// # Errors
     /// A folder that can't be written; the last good files stay.
     pub fn save(&self) -> Result<(), RunError> {
-        self.remove_results();
+        self.remove_results()?;
         self.run.save(&self.trainer)
     }
 
@@ -140,7 +140,7 @@ impl Session {
     /// # Errors
     /// A folder that can't be written; the last good policy stays.
     pub fn save_policy(&self) -> Result<(), RunError> {
-        self.remove_results();
+        self.remove_results()?;
         if !self.run.is_saved() {
             let (settings, task) = (self.trainer.settings().clone(), self.trainer.task().clone());
             self.run.save(&Trainer::new(settings, task)?)?;
@@ -148,10 +148,12 @@ impl Session {
         self.run.save_policy(&self.trainer)
     }
 
-    fn remove_results(&self) {
+    fn remove_results(&self) -> Result<(), RunError> {
+        self.run.check_place()?;
         for outdated in [files::EVALUATION, files::RECORDING] {
             std::fs::remove_file(self.run.dir().join(outdated)).ok();
         }
+        Ok(())
     }
 
     /// Whether the run's policy file is whole and holds what was learned last. It can be lost, damaged, or older than the

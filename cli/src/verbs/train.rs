@@ -19,7 +19,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use clock::Clock;
 use finish::Stopped;
 use mimic::run::{Claim, Plan, Run, RunError, Session, files};
-use mimic::task::{TASKS, TaskError};
+use mimic::task::{CharacterModel, TASKS, TaskError};
 use preset::Preset;
 use progress::Progress;
 pub use resume::program;
@@ -129,28 +129,36 @@ impl Args {
     pub fn run(self, library: &Path, printer: &Printer) -> Outcome {
         let begun = Instant::now();
         let threads = runs::use_threads(self.threads)?;
+        let stop = Stop::on_signals()?;
         let run = match &self.resume {
             Some(run) => runs::open(Some(run))?,
-            None => self.create(library, printer)?,
+            None => {
+                let created = self.create(library, &stop, printer);
+                stop.give_way();
+                created?
+            }
         };
-        let folder = run.dir().to_owned();
+        let unsaved = run.unsaved();
         let minutes = self
             .minutes
             .map(|minutes| Duration::from_secs_f64(60.0 * minutes));
-        let outcome = learn(run, Clock::new(begun, minutes), threads, printer);
-        if outcome.is_err() && self.resume.is_none() {
+        let outcome = learn(run, Clock::new(begun, minutes), &stop, threads, printer);
+        stop.give_way();
+        if outcome.is_err() {
             // Unless something was saved, there is nothing that a later command could use.
-            Run::discard(folder);
+            unsaved.remove();
         }
         outcome
     }
 
     /// Makes the run. Its folder is claimed first, so that another process doesn't take it meanwhile, and is removed again if
     /// something that the run needs can't be had.
-    fn create(&self, library: &Path, printer: &Printer) -> Outcome<Run> {
+    fn create(&self, library: &Path, stop: &Stop, printer: &Printer) -> Outcome<Run> {
         let preset = self.preset()?;
         let preparations = self.preparations(library, preset.skeleton)?;
         let claim = self.claim(&preparations, printer)?;
+        let unsaved = claim.unsaved();
+        stop.before_end(move || unsaved.remove());
         let mut motions = Vec::new();
         let mut skeleton = None;
         say_repeated(&preparations, printer);
@@ -174,6 +182,11 @@ impl Args {
             motions.push(motion);
         }
         let skeleton = skeleton.ok_or_else(|| Failure::user("there is no motion to learn"))?;
+        // What a character can't do is the fault of its file, which the run doesn't know.
+        if let Some(file) = &self.retarget.skeleton {
+            let model = CharacterModel::new(skeleton.clone());
+            model.map_err(|e| Failure::in_file(Path::new(file), e))?;
+        }
         let run = claim.create(preset.plan.clone(), skeleton, motions);
         run.map_err(|e| preset.failure(e))
     }
@@ -295,7 +308,7 @@ fn say_repeated(preparations: &[Preparation], printer: &Printer) {
 }
 
 /// Trains the run, or makes up for what is missing of its results.
-fn learn(run: Run, clock: Clock, threads: usize, printer: &Printer) -> Outcome {
+fn learn(run: Run, clock: Clock, stop: &Stop, threads: usize, printer: &Printer) -> Outcome {
     let config = run.dir().join(files::CONFIG);
     let session = Session::open(run);
     let mut session = session.map_err(|e| preset::failure(Some(&config), e))?;
@@ -306,27 +319,47 @@ fn learn(run: Run, clock: Clock, threads: usize, printer: &Printer) -> Outcome {
         "training `{}` on {threads} threads; Ctrl-C saves and stops",
         session.run().dir().display()
     ));
-    match train(&mut session, clock, printer)? {
+    match train(&mut session, clock, stop, printer)? {
         Stopped::Interrupt => {
             printer.say(farewell(session.run()));
-            finish::interrupted(session.run(), printer)
+            finish::interrupted(session.run().dir(), printer)
         }
-        stopped => finish::finish(&session, stopped, printer),
+        stopped => {
+            let (text, run, printer) = (farewell(session.run()), session.run().dir(), *printer);
+            let run = run.to_owned();
+            stop.before_end(move || {
+                printer.say(&text);
+                // Nobody is left to tell that it can't be printed.
+                finish::interrupted(&run, &printer).ok();
+            });
+            finish::finish(&session, stopped, &printer)
+        }
     }
 }
 
 /// Trains until the samples or the time are used up, until it is asked to stop, or until nobody reads its lines any more. It
 /// saves between rounds only: there a run can be continued bit for bit. Time that is up within a round leaves the policy, and
 /// the run goes on before that round.
-fn train(session: &mut Session, mut clock: Clock, printer: &Printer) -> Outcome<Stopped> {
+fn train(
+    session: &mut Session,
+    mut clock: Clock,
+    stop: &Stop,
+    printer: &Printer,
+) -> Outcome<Stopped> {
     let progress = Progress::new(session, printer);
-    let stop = Stop::on_signals({
-        let (bar, printer, text) = (progress.bar(), *printer, farewell(session.run()));
+    stop.before_end({
+        let (bar, printer, run) = (progress.bar(), *printer, session.run());
+        let (folder, text, unsaved) = (run.dir().to_owned(), farewell(run), run.unsaved());
         move || {
             bar.finish_and_clear();
-            printer.say(&text);
+            unsaved.remove();
+            match folder.join(files::CONFIG).exists() {
+                true => printer.say(&text),
+                false => printer.say("stopped before anything was saved; train again"),
+            }
         }
-    })?;
+    });
+    stop.save_first();
     let mut unheard = None;
     let end = loop {
         let iteration = session.iterate();

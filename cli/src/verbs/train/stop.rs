@@ -1,77 +1,77 @@
-//! Signals that ask training to stop: Ctrl-C (SIGINT), a system that shuts down (SIGTERM), a terminal that closes (SIGHUP).
-//! The first lets training save, the second ends the program at once. Once there is nothing left to save, the first ends it
-//! too.
+//! Signals that ask training to stop. While it learns, the first lets it save, and the second ends the program at once. Before
+//! and after that there is nothing to save, and the first ends it.
 
-use crate::failure::{Failure, Outcome};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use crate::failure::Outcome;
+use crate::signals;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The exit code that shells report for a program ended by Ctrl-C: 128 and the number of SIGINT.
 const STOPPED: i32 = 130;
 
+/// What is done before the program ends at once.
+type Farewell = Box<dyn FnOnce() + Send>;
+
 /// Counts the signals.
-pub struct Stop(Arc<AtomicUsize>);
+#[derive(Clone)]
+pub struct Stop(Arc<State>);
+
+struct State {
+    signals: AtomicUsize,
+    /// The program ends at once.
+    ends: AtomicBool,
+    farewell: Mutex<Option<Farewell>>,
+}
 
 impl Stop {
-    /// Begins to count. `farewell` runs before the program ends at once.
-    pub fn on_signals(farewell: impl Fn() + Send + 'static) -> Outcome<Self> {
-        let signals = Arc::new(AtomicUsize::new(0));
-        let counted = signals.clone();
-        let handler = move || {
-            if counted.fetch_add(1, Ordering::SeqCst) > 0 {
-                farewell();
+    /// Begins to listen. The next signal ends the program.
+    pub fn on_signals() -> Outcome<Self> {
+        let state = Arc::new(State {
+            signals: AtomicUsize::new(1),
+            ends: AtomicBool::new(false),
+            farewell: Mutex::new(None),
+        });
+        let stop = Self(state.clone());
+        signals::on_stop(move || {
+            if state.signals.fetch_add(1, Ordering::SeqCst) > 0 {
+                state.ends.store(true, Ordering::SeqCst);
+                let farewell = Self(state.clone()).set(None);
+                farewell.into_iter().for_each(|farewell| farewell());
                 std::process::exit(STOPPED);
             }
-        };
-        let outlives_terminal = hangup::is_ignored();
-        ctrlc::set_handler(handler)
-            .map_err(|e| Failure::work(format!("cannot listen for Ctrl-C: {e}")))?;
-        if outlives_terminal {
-            hangup::ignore();
+        })?;
+        Ok(stop)
+    }
+
+    /// From now on `farewell` is done before the program ends at once.
+    pub fn before_end(&self, farewell: impl FnOnce() + Send + 'static) {
+        self.set(Some(Box::new(farewell)));
+    }
+
+    fn set(&self, farewell: Option<Farewell>) -> Option<Farewell> {
+        let held = self.0.farewell.lock();
+        std::mem::replace(&mut held.unwrap_or_else(PoisonError::into_inner), farewell)
+    }
+
+    /// Waits for the end of a program that ends at once: what it removes meanwhile looks like an error to who writes there.
+    pub fn give_way(&self) {
+        while self.0.ends.load(Ordering::SeqCst) {
+            std::thread::park();
         }
-        Ok(Self(signals))
+    }
+
+    /// From now on the first signal lets training save.
+    pub fn save_first(&self) {
+        self.0.signals.store(0, Ordering::SeqCst);
     }
 
     /// Whether training is asked to stop.
     pub fn is_wanted(&self) -> bool {
-        self.0.load(Ordering::SeqCst) > 0
+        self.0.signals.load(Ordering::SeqCst) > 0
     }
 
     /// Lets the next signal end the program. Returns whether there was one before.
-    pub fn release(self) -> bool {
-        self.0.swap(1, Ordering::SeqCst) > 0
+    pub fn release(&self) -> bool {
+        self.0.signals.swap(1, Ordering::SeqCst) > 0
     }
-}
-
-/// `nohup` starts a program with SIGHUP ignored, so that it outlives its terminal. That is to stay so.
-#[cfg(unix)]
-#[allow(
-    unsafe_code,
-    reason = "no safe interface tells or keeps what happens at a signal"
-)]
-mod hangup {
-    pub fn is_ignored() -> bool {
-        let mut action = std::mem::MaybeUninit::<libc::sigaction>::uninit();
-        // SAFETY: with a null second argument `sigaction` changes nothing, and writes the third when it returns 0.
-        unsafe {
-            libc::sigaction(libc::SIGHUP, std::ptr::null(), action.as_mut_ptr()) == 0
-                && action.assume_init().sa_sigaction == libc::SIG_IGN
-        }
-    }
-
-    pub fn ignore() {
-        // SAFETY: ignoring a signal runs no code of ours.
-        unsafe {
-            libc::signal(libc::SIGHUP, libc::SIG_IGN);
-        }
-    }
-}
-
-#[cfg(not(unix))]
-mod hangup {
-    pub fn is_ignored() -> bool {
-        false
-    }
-
-    pub fn ignore() {}
 }

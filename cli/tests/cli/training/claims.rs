@@ -173,7 +173,7 @@ fn a_run_that_fails_before_its_first_checkpoint_leaves_nothing() {
     assert!(!bench.path("runs/sway").exists());
     // What a killed process left is no run that is picked up without its name, and its folder stays its own.
     bench.mimic(&SMALL).assert().success();
-    std::fs::create_dir(bench.path("runs/left")).expect("a folder");
+    std::fs::create_dir_all(bench.path("runs/left")).expect("a folder");
     for file in [
         "config.json",
         "skeleton.xml",
@@ -184,7 +184,7 @@ fn a_run_that_fails_before_its_first_checkpoint_leaves_nothing() {
         std::fs::copy(from, bench.path("runs/left").join(file)).expect("copied");
     }
     let said = bench.complaint(&["eval"], 2);
-    assert!(said.contains("there is no run in"), "{said}");
+    assert!(said.contains("nothing was saved of this run yet"), "{said}");
     bench
         .mimic(&["train", "--resume", "left"])
         .assert()
@@ -217,4 +217,84 @@ fn a_lost_or_damaged_policy_is_made_again_from_the_checkpoint() {
         assert_eq!(std::fs::read(&policy).ok(), Some(whole.clone()), "{what}");
         assert_eq!(object(&bench, "run/eval.json")["episodes"], json!(32));
     }
+}
+
+/// All files of a folder and their bytes.
+fn contents(bench: &Workbench, folder: &str) -> Vec<(String, Vec<u8>)> {
+    let entries = std::fs::read_dir(bench.path(folder)).into_iter().flatten();
+    let mut files: Vec<_> = entries
+        .flatten()
+        .map(|entry| {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            (name, std::fs::read(entry.path()).unwrap_or_default())
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+/// Whatever takes the place of the folder that is trained in, it is not written, and the trainer says why it stops.
+#[cfg(unix)]
+#[test]
+fn a_trainer_whose_folder_is_moved_stops_and_spares_what_takes_its_place() {
+    let bench = with_run();
+    std::fs::rename(bench.path("run"), bench.path("other")).expect("moved");
+    for place in ["nothing", "a run", "an empty folder", "a link to a run"] {
+        let child = long(&bench);
+        std::fs::rename(bench.path("run"), bench.path("away")).expect("moved");
+        match place {
+            "nothing" => {}
+            "a run" => {
+                std::fs::create_dir(bench.path("run")).expect("a folder");
+                for (name, bytes) in contents(&bench, "other") {
+                    bench.write(&format!("run/{name}"), &bytes);
+                }
+            }
+            "an empty folder" => std::fs::create_dir(bench.path("run")).expect("a folder"),
+            _ => std::os::unix::fs::symlink("other", bench.path("run")).expect("a link"),
+        }
+        let before = contents(&bench, "run");
+        let output = child.wait_with_output().expect("the program ends");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{place}: {said}");
+        assert_eq!(said.lines().count(), 1, "{place}: {said}");
+        assert!(
+            said.contains("`run`: the folder of this run was moved"),
+            "{said}"
+        );
+        assert_eq!(contents(&bench, "run"), before, "{place}");
+        // It goes on where its folder is now.
+        let line = ["train", "--resume", "away", "--minutes", "1e-9"];
+        bench.mimic(&line).assert().success();
+        std::fs::remove_dir_all(bench.path("away")).expect("removed");
+        std::fs::remove_dir_all(bench.path("run"))
+            .or_else(|_| std::fs::remove_file(bench.path("run")))
+            .ok();
+    }
+}
+
+#[test]
+fn a_folder_of_the_user_stays_and_those_made_for_a_failed_run_do_not() {
+    let bench = with_preset();
+    let fails = |out: &str| {
+        let line = ["train", "sway.txt", "--preset", "small.json", "--out", out];
+        let rates = [
+            "ppo.learning_rate=1e30",
+            "ppo.max_learning_rate=1e30",
+            "ppo.target_kl=null",
+        ];
+        let set = rates.iter().flat_map(|rate| ["--set", rate]);
+        let said = bench.complaint(&line.into_iter().chain(set).collect::<Vec<_>>(), 1);
+        assert!(said.contains("not finite"), "{said}");
+    };
+    for mine in ["mine", "outer/mine"] {
+        std::fs::create_dir_all(bench.path(mine)).expect("a folder");
+        fails(mine);
+        assert_eq!(contents(&bench, mine), [], "{mine}");
+        assert!(bench.path(mine).is_dir(), "{mine}");
+    }
+    fails("deep/a/b");
+    assert!(!bench.path("deep").exists());
+    fails("outer/mine/deep/a");
+    assert_eq!(contents(&bench, "outer/mine"), []);
 }

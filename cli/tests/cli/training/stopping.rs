@@ -312,4 +312,80 @@ mod signals {
         }
         assert_same_as_unbroken(&bench, &format!("killed after {moments:?} ms"));
     }
+
+    /// A clip that takes a while to retarget.
+    fn with_long_clip() -> Workbench {
+        let bench = with_preset();
+        let text = std::fs::read(bench.path("sway.txt")).expect("the clip is there");
+        let mut clip: Value = serde_json::from_slice(&text).expect("it is JSON");
+        let frames = clip["Frames"].as_array().expect("a list").clone();
+        clip["Frames"] = frames.iter().cycle().take(6000).cloned().collect();
+        bench.write("sway.txt", clip.to_string().as_bytes());
+        bench
+    }
+
+    #[test]
+    fn a_run_that_is_prepared_is_listed_and_leaves_nothing_when_it_is_stopped() {
+        for name in ["-INT", "-TERM", "-HUP"] {
+            let bench = with_long_clip();
+            let line = ["train", "sway.txt", "--preset", "small.json"];
+            let mut running = start(&bench, &line);
+            wait_until(|| bench.path("runs/sway/.mimic.lock").exists());
+            let listed = bench.json(&["runs"]);
+            let run = &listed["runs"][0];
+            assert_eq!(run["state"], "preparing", "{listed}");
+            let holder = run["held_by"].as_str().unwrap_or_default();
+            assert!(holder.contains(&running.0.id().to_string()), "{listed}");
+            signal(&running, name);
+            let status = running.0.wait().expect("the program ends");
+            assert_eq!(status.code(), Some(130), "{name}");
+            assert!(!bench.path("runs").exists(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_second_signal_before_the_first_save_leaves_nothing() {
+        let bench = bench();
+        let plan = r#"{ "environments": 8, "group": 4, "horizon": 16, "round": 100000, "samples": 128000000, "hidden": [16] }"#;
+        bench.write("small.json", plan.as_bytes());
+        let mut running = start(&bench, &SMALL);
+        wait_until(|| logged_iterations(&bench) > 1);
+        interrupt(&running);
+        std::thread::sleep(Duration::from_millis(200));
+        interrupt(&running);
+        assert_eq!(
+            running.0.wait().ok().and_then(|status| status.code()),
+            Some(130)
+        );
+        let said = talk(&mut running);
+        assert!(said.contains("before anything was saved"), "{said}");
+        assert!(!bench.path("run").exists());
+    }
+
+    /// `ulimit -f`: the system lets no file grow further.
+    #[test]
+    fn files_that_may_not_grow_are_reported() {
+        let bench = with_run();
+        let before = std::fs::read_dir(bench.path(".")).expect("listed").count();
+        for line in [
+            "train sway.txt --preset small.json --out cut",
+            "import sway.txt",
+            "retarget sway.txt",
+            "tracks sway.txt --plot sway.svg",
+            "plot run",
+        ] {
+            let program = assert_cmd::cargo::cargo_bin("mimic");
+            let script = format!("ulimit -f 1; exec '{}' {line}", program.display());
+            let output = Command::new("sh")
+                .args(["-c", &script])
+                .current_dir(bench.path("."))
+                .output()
+                .expect("it runs");
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+            assert!(said.contains("cannot be written"), "{line}: {said}");
+            let after = std::fs::read_dir(bench.path(".")).expect("listed").count();
+            assert_eq!(before, after, "{line}: nothing was added");
+        }
+    }
 }
