@@ -25,7 +25,8 @@ pub struct Talk {
     pub verbose: bool,
 }
 
-/// Most frames per second, which is what clips can have.
+/// Fewest and most frames per second that a clip can have.
+const LEAST_FPS: f64 = 0.1;
 const MOST_FPS: f64 = 10_000.0;
 
 /// Whether a result may take the place of something else.
@@ -167,8 +168,8 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// Frames per second, up to what a clip may have.
 fn frame_rate(text: &str) -> Result<f64, String> {
     match positive(text)? {
-        rate if rate <= MOST_FPS => Ok(rate),
-        _ => Err(format!("must be at most {MOST_FPS}")),
+        rate if (LEAST_FPS..=MOST_FPS).contains(&rate) => Ok(rate),
+        _ => Err(format!("must be from {LEAST_FPS} to {MOST_FPS}")),
     }
 }
 
@@ -194,7 +195,7 @@ fn slot_weight(text: &str) -> Result<(Slot, f64), String> {
 /// Most of anything that is counted on the command line, and most threads. Chosen: far above any use; a system that is asked
 /// for 100,000 threads stands still.
 const MOST: usize = 1_000_000;
-const MOST_THREADS: usize = 1024;
+pub const MOST_THREADS: usize = 1024;
 
 /// A whole number from 1.
 pub fn at_least_one(text: &str) -> Result<usize, String> {

@@ -1,5 +1,6 @@
 //! What can go wrong with a clip and its file.
 
+use super::sampling::{LEAST_FPS, MOST_FPS, MOST_SECONDS};
 use crate::explain::{Explain, Explanation, Parameter, explained};
 use crate::file::FileError;
 
@@ -29,6 +30,11 @@ pub enum Error {
         duration: f64,
         /// Frames per second of the result.
         fps: f64,
+    },
+    /// A result that lasts longer than a clip may.
+    TooSlow {
+        /// Length of the result, seconds.
+        duration: f64,
     },
     /// A playback speed that isn't a positive number.
     Speed {
@@ -111,8 +117,15 @@ impl Explain for Error {
             Self::File(error) => error.explain(),
             Self::Rate { fps } => {
                 wrong(format!("{fps} frames per second is not a usable frame rate"))
-                    .remedy_by(Parameter::FrameRate, "give a positive number up to 10000")
+                    .remedy_by(
+                        Parameter::FrameRate,
+                        format!("give a number from {LEAST_FPS} to {MOST_FPS}"),
+                    )
             }
+            Self::TooSlow { duration } => wrong(format!(
+                "the result would last {duration:.0} s, and a clip lasts at most {MOST_SECONDS} s"
+            ))
+            .remedy("make it shorter or faster"),
             Self::EmptyTrim { from, to, duration } => wrong(format!(
                 "the part from {from} s to {to:.3} s is empty: the clip lasts {duration:.3} s"
             ))
@@ -138,7 +151,7 @@ impl Explain for Error {
                 "the time-warp point {from}:{to} doesn't fit the clip of {duration:.3} s"
             ))
             .remedy(
-                "let both times rise from point to point, starting above 0, and keep the first within the clip",
+                "let both times rise from point to point by a microsecond or more, starting above 0, and keep the first within the clip",
             ),
             Self::Pair {
                 left,

@@ -6,7 +6,7 @@
 //! quaternions w, x, y, z. The metadata has the fields of [`Header`], of which `humanoid` is there
 //! only where the source says which joint is which bone.
 
-use super::sampling::{MOST_FPS, MOST_TRANSFORMS};
+use super::sampling::{MOST_TRANSFORMS, length_flaw, rate_flaw};
 use super::stored::{self, floats, isometries, rotations, rounded, translations};
 use super::{Clip, Error, LoopMode, Margin, Problem, Source};
 use crate::file::{self, Flaw, Format, Reader, Writer};
@@ -121,6 +121,10 @@ impl Clip {
         if frames.is_empty() {
             return Err(Flaw::in_tensor(LOCAL[0], "0 frames"));
         }
+        let duration = (frames.len() - 1) as f64 / header.fps;
+        if let Some(cause) = length_flaw(duration) {
+            return Err(Flaw::content("fps", cause));
+        }
         let around = |names: [&str; 2]| match reader.has(names[0]) {
             true => read_frames(&reader, names, j),
             false => Ok(Vec::new()),
@@ -148,8 +152,7 @@ fn header(reader: &Reader) -> Result<Header, Flaw> {
     if header.joints.is_empty() {
         return Err(Flaw::content("joints", "no joints"));
     }
-    if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
-        let cause = format!("a rate of {} frames per second", header.fps);
+    if let Some(cause) = rate_flaw(header.fps) {
         return Err(Flaw::content("fps", cause));
     }
     Ok(header)

@@ -17,7 +17,9 @@ pub use error::Error;
 pub(crate) use extent::extent;
 pub use margin::Margin;
 pub use problem::{Problem, Severity};
-pub(crate) use sampling::{Grid, MOST_FPS, MOST_TRANSFORMS, slerp};
+pub(crate) use sampling::{
+    Grid, LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_TRANSFORMS, length_flaw, rate_flaw, slerp,
+};
 
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};

@@ -14,8 +14,27 @@ const SAME_RATE: f64 = 1e-4;
 const WILD: f64 = 2.0;
 /// Most frames × joints that a clip may have. Chosen: 20 million take 1.1 GB in memory, at seven numbers of eight bytes.
 pub(crate) const MOST_TRANSFORMS: usize = 20_000_000;
-/// Highest frame rate that can be sampled, Hz. Chosen: beyond any camera or simulation.
+/// Lowest and highest frame rate that a clip or a motion may have, Hz. Chosen: frames that are ten seconds apart tell nothing of a
+/// movement, and the highest is beyond any camera or simulation.
+pub(crate) const LEAST_FPS: f64 = 0.1;
 pub(crate) const MOST_FPS: f64 = 10_000.0;
+/// Longest that a clip or a motion may last, seconds. Chosen: an hour is longer than any take that somebody retargets as a whole,
+/// and few frames that last for days would fill tables of many frames a second.
+pub(crate) const MOST_SECONDS: f64 = 3600.0;
+
+/// What is wrong with a frame rate, Hz; `None` for one that can be used.
+pub(crate) fn rate_flaw(fps: f64) -> Option<String> {
+    let usable = (LEAST_FPS..=MOST_FPS).contains(&fps);
+    let told = || format!("{fps} is no frame rate from {LEAST_FPS} to {MOST_FPS} Hz");
+    (!usable).then(told)
+}
+
+/// What is wrong with a duration, seconds; `None` for one that can be used.
+pub(crate) fn length_flaw(seconds: f64) -> Option<String> {
+    let usable = seconds <= MOST_SECONDS;
+    let told = || format!("it lasts {seconds:.0} s, and at most {MOST_SECONDS} s can be used");
+    (!usable).then(told)
+}
 
 /// The rotation a fraction `t` of the way from `a` to `b`, the short way round at constant speed. Opposite rotations have no
 /// short way: `a` stays.
@@ -82,12 +101,13 @@ impl Grid {
     /// Frames over `duration` seconds at about `fps` Hz. `None` if `fps` isn't a rate that can be sampled, or there would be
     /// more than `most` frames. A span too short for two frames at any rate is an instant, of one frame.
     pub fn new(duration: f64, fps: f64, most: usize) -> Option<Self> {
-        if !(fps > 0.0 && fps <= MOST_FPS && duration >= 0.0) {
+        if rate_flaw(fps).is_some() || duration.is_nan() || duration < 0.0 {
             return None;
         }
-        // Intervals as the rate asks, at least one, but none shorter than the highest rate has.
-        let fit = (duration * MOST_FPS).floor();
-        let intervals = (duration * fps).round().max(1.0).min(fit);
+        // Intervals as the rate asks, at least one, but none longer than the lowest rate has, or shorter than the highest.
+        let (least, fit) = (duration * LEAST_FPS, duration * MOST_FPS);
+        let intervals = (duration * fps).round().max(1.0).max(least.ceil());
+        let intervals = intervals.min(fit.floor());
         if intervals >= most as f64 {
             return None;
         }
@@ -260,6 +280,9 @@ impl Clip {
         let most = MOST_TRANSFORMS / self.joints.len().max(1);
         if Grid::new(0.0, fps, most).is_none() {
             return Err(Error::Rate { fps });
+        }
+        if length_flaw(duration).is_some() {
+            return Err(Error::TooSlow { duration });
         }
         Grid::new(duration, fps, most).ok_or(Error::TooLong { duration, fps })
     }

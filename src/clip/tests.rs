@@ -296,7 +296,7 @@ fn broken_clip_files_are_refused_with_a_reason() {
         (
             r#"\"fps\":30.0,\"joints\""#,
             r#"\"fps\":-3.0,\"joints\""#,
-            "rate of -3",
+            "-3 is no frame rate",
         ),
         (
             r#"[\"root\",\"arm\"]"#,

@@ -10,6 +10,11 @@ use crate::task::{
 /// take about 2 kB each.
 const MOST_STEPS: f64 = 500_000.0;
 
+/// Longest case, seconds, that can be evaluated in so many episodes, at so many control steps a second.
+pub(crate) fn longest(episodes: f64, control_hz: f64) -> f64 {
+    MOST_STEPS / episodes / control_hz
+}
+
 /// One of the episodes that run together.
 struct Running {
     environment: Box<dyn Environment>,

@@ -25,6 +25,14 @@ pub struct Options {
     pub perturbations: Option<Perturbations>,
 }
 
+impl Options {
+    /// How many episodes there are in all: from each phase once, or twice where they are disturbed, and one from rest.
+    pub(crate) fn performed(&self) -> f64 {
+        let passes = 1.0 + f64::from(u8::from(self.perturbations.is_some()));
+        self.episodes.max(1) as f64 * passes + 1.0
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self {
@@ -118,14 +126,13 @@ pub fn evaluate<A: Agent>(
     options: &Options,
 ) -> Result<Evaluation, EvaluateError> {
     let count = options.episodes.max(1);
-    let passes = 1.0 + f64::from(u8::from(options.perturbations.is_some()));
     let duration = agent
         .task()
         .cases()
         .get(case)
         .and_then(|case| case.duration_s);
     let steps = duration.unwrap_or(options.seconds) * agent.task().control_hz();
-    check_steps((count as f64 * passes + 1.0) * steps)?;
+    check_steps(options.performed() * steps)?;
     let start = |n: usize| StartState::Reference(n as f64 / count as f64);
     let phases = (0..count).map(|n| EpisodeStart::new(case, start(n)));
     let rest = EpisodeStart::new(case, StartState::Rest);

@@ -5,5 +5,6 @@ mod episode;
 mod evaluation;
 
 pub use agent::{Agent, EvaluateError};
+pub(crate) use episode::longest;
 pub use episode::{perform, perform_sequence};
 pub use evaluation::{Disturbed, Evaluation, FailedEpisode, Options, evaluate};

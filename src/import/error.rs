@@ -1,6 +1,6 @@
 //! What can go wrong between a file and a clip.
 
-use crate::clip;
+use crate::clip::{self, LEAST_FPS, MOST_FPS, MOST_SECONDS};
 use crate::explain::{Explain, Explanation, Parameter, explained};
 use crate::file::unread;
 use crate::humanoid;
@@ -57,6 +57,13 @@ pub enum ErrorKind {
     Rate {
         /// Frames per second.
         fps: f64,
+    },
+    /// A part that lasts longer than a clip may.
+    Lasting {
+        /// Name of the take.
+        take: String,
+        /// Its length.
+        seconds: f64,
     },
     /// A unit of length that isn't a positive number.
     Unit {
@@ -153,10 +160,18 @@ impl ErrorKind {
             .remedy_by(Parameter::Trim, "choose a part within the take"),
             Self::Rate { fps } => {
                 wrong(format!("{fps} frames per second is not a usable frame rate"))
-                    .remedy_by(Parameter::FrameRate, "give a positive number up to 10000")
+                    .remedy_by(
+                        Parameter::FrameRate,
+                        format!("give a number from {LEAST_FPS} to {MOST_FPS}"),
+                    )
             }
+            Self::Lasting { take, seconds } => in_take(
+                take,
+                format!("it lasts {seconds:.0} s, and a clip lasts at most {MOST_SECONDS} s"),
+            )
+            .remedy_by(Parameter::Trim, "keep a part of it"),
             Self::Unit { unit_m } => wrong(format!("{unit_m} m is not a usable unit of length"))
-                .remedy_by(Parameter::Unit, "give a positive number of metres"),
+                .remedy_by(Parameter::Unit, "give a number of metres from 1e-9 to 1e6"),
             Self::TooLong {
                 take,
                 frames,
@@ -176,7 +191,10 @@ impl ErrorKind {
                 };
                 wrong("its position is not finite, or too large to use".to_owned())
                     .place(place)
-                    .remedy("repair its keys in the tool that wrote the file")
+                    .remedy_by(
+                        Parameter::Unit,
+                        "check the unit of length, or repair its keys in the tool that wrote the file",
+                    )
             }
             Self::NoSides { source } => wrong(format!(
                 "it can't be mirrored, because left and right aren't known: {}",

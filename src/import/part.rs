@@ -2,7 +2,7 @@
 
 use super::error::ErrorKind;
 use super::scene::{Scene, Take};
-use crate::clip::{Grid, MOST_TRANSFORMS, Margin};
+use crate::clip::{Grid, MOST_TRANSFORMS, Margin, length_flaw};
 use std::ops::Range;
 
 /// Nodes or channels that may be evaluated for each transform that is kept: most of a file's nodes may not be joints.
@@ -140,9 +140,16 @@ fn grid(
     let Some(one) = Grid::new(0.0, fps, 2) else {
         return Err(ErrorKind::Rate { fps });
     };
-    Grid::new(duration, one.fps, most).ok_or_else(|| ErrorKind::TooLong {
+    let grid = Grid::new(duration, one.fps, most).ok_or_else(|| ErrorKind::TooLong {
         take: take.name.clone(),
         frames: (duration * fps).round() + 1.0,
         nodes,
-    })
+    })?;
+    match length_flaw(duration) {
+        Some(_) => Err(ErrorKind::Lasting {
+            take: take.name.clone(),
+            seconds: duration,
+        }),
+        None => Ok(grid),
+    }
 }

@@ -10,6 +10,10 @@ use super::{lead, names, seam};
 use crate::clip::{Clip, LoopMode, Margin, Problem, Source};
 use nalgebra::Isometry3;
 
+/// Smallest and largest unit of length, metres. Chosen: a nanometre, and more than any motion goes.
+const LEAST_UNIT: f64 = 1e-9;
+const MOST_UNIT: f64 = 1e6;
+
 /// World transforms of all joints.
 type Pose = Vec<Isometry3<f64>>;
 
@@ -26,7 +30,7 @@ struct Sampled {
 /// The frame of reference that the file states, or that the options put in its place.
 pub(super) fn frame(scene: &dyn Scene, options: &Options) -> Result<Frame, ErrorKind> {
     let unit_m = options.unit_m.unwrap_or_else(|| scene.contents().unit_m);
-    if !(unit_m > 0.0 && unit_m.is_finite()) {
+    if !(LEAST_UNIT..=MOST_UNIT).contains(&unit_m) {
         return Err(ErrorKind::Unit { unit_m });
     }
     let axes = match options.up {

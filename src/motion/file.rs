@@ -16,7 +16,7 @@
 use super::source::RigHeader;
 use super::{Cycle, Motion, MotionError, RetargetReport, SourceRig, Tracks};
 use crate::clip::stored::stored_rotation;
-use crate::clip::{LoopMode, MOST_FPS};
+use crate::clip::{LoopMode, length_flaw, rate_flaw};
 use crate::file::{self, Flaw, Format, Reader, Writer};
 use nalgebra::{Isometry3, Quaternion, Translation3, Vector3, Vector6};
 use safetensors::tensor::{Dtype, TensorView};
@@ -28,6 +28,11 @@ const FORMAT: Format = Format {
     version: 1,
     remedy: "retarget its clip again",
 };
+
+/// Largest coordinate, in metres or radians, and largest velocity, in metres or radians a second. Chosen: in single precision, in
+/// which a character is simulated, a point 100 km away is known to a centimetre, and no body moves at 100 km/s.
+const MOST_COORDINATE: f64 = 1e5;
+const MOST_SPEED: f64 = 1e5;
 
 /// The metadata of a motion file.
 #[derive(Serialize, Deserialize)]
@@ -142,8 +147,11 @@ impl Motion {
         let reader = Reader::open(bytes, FORMAT)?;
         let header = header(&reader)?;
         let table = Table { reader };
-        let qpos = table.rows("qpos", None)?;
+        let qpos = within(MOST_COORDINATE, "qpos", table.rows("qpos", None)?)?;
         let frames = qpos.len();
+        if let Some(cause) = length_flaw(frames.saturating_sub(1) as f64 / header.fps) {
+            return Err(Flaw::content("fps", cause));
+        }
         let bodies = header.bodies.len();
         let contact_bodies = contact_bodies(&header)?;
         let rows = |name: &str, width: usize| table.rows_of(name, frames, Some(width));
@@ -166,7 +174,7 @@ impl Motion {
             body_names: header.bodies,
             tracks: table.tracks(frames, contact_bodies.len())?,
             contact_bodies,
-            qvel: table.rows_of("qvel", frames, None)?,
+            qvel: within(MOST_SPEED, "qvel", table.rows_of("qvel", frames, None)?)?,
             qpos,
             bodies: poses,
             report: header.report,
@@ -198,15 +206,30 @@ fn push_tracks(writer: &mut Writer, tracks: &Tracks) {
 /// The metadata, as far as it can be checked without the tensors.
 fn header(reader: &Reader) -> Result<Header, Flaw> {
     let header: Header = reader.fields()?;
-    if !(header.fps > 0.0 && header.fps <= MOST_FPS) {
-        let cause = format!("{} is no positive rate up to {MOST_FPS} Hz", header.fps);
+    if let Some(cause) = rate_flaw(header.fps) {
         return Err(Flaw::content("fps", cause));
     }
     let cycle = &header.cycle;
-    if !cycle.heading.is_finite() || cycle.translation.iter().any(|x| !x.is_finite()) {
+    let numbers = [&cycle.translation[..], &[cycle.heading]].concat();
+    if numbers.iter().any(|x| !x.is_finite()) {
         return Err(Flaw::content("cycle", "a number is not finite"));
     }
+    if numbers.iter().any(|x| x.abs() > MOST_COORDINATE) {
+        return Err(Flaw::content("cycle", "a number is too large to use"));
+    }
     Ok(header)
+}
+
+/// The rows of the tensor `name`, if all their numbers are of a size that can be simulated.
+fn within(most: f64, name: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Flaw> {
+    let large = |row: &Vec<f64>| row.iter().any(|x| x.abs() > most);
+    match rows.iter().position(large) {
+        Some(frame) => {
+            let cause = format!("a number in frame {frame} is beyond {most:e}, too large to use");
+            Err(Flaw::in_tensor(name, cause))
+        }
+        None => Ok(rows),
+    }
 }
 
 fn contact_bodies(header: &Header) -> Result<Vec<usize>, Flaw> {

@@ -1,6 +1,6 @@
 //! Why a clip can't be retargeted.
 
-use crate::clip::MOST_FPS;
+use crate::clip::{LEAST_FPS, MOST_FPS, MOST_SECONDS};
 use crate::explain::{Explain, Explanation, Parameter, explained};
 use crate::humanoid::{self, Slot};
 
@@ -48,12 +48,14 @@ pub enum RetargetError {
         /// The joint's name.
         joint: String,
     },
-    /// The clip's frame rate is out of range.
+    /// The clip's frame rate is out of range, or it lasts too long.
     FrameRate {
         /// The clip's name.
         clip: String,
         /// Hz.
         fps: f64,
+        /// How long it lasts.
+        seconds: f64,
     },
     /// A frame has more or fewer transforms than the clip has joints.
     Ragged {
@@ -121,13 +123,13 @@ impl Explain for RetargetError {
             ))
             .place(format!("rest pose, joint `{joint}`"))
             .remedy("export the clip again"),
-            Self::FrameRate { clip, fps } => {
-                Explanation::input(format!("clip `{clip}` has a frame rate of {fps} Hz"))
-                    .remedy_by(
-                        Parameter::FrameRate,
-                        format!("use a rate above 0 and up to {MOST_FPS} Hz"),
-                    )
-            }
+            Self::FrameRate { clip, fps, seconds } => Explanation::input(format!(
+                "clip `{clip}` has a frame rate of {fps} Hz and lasts {seconds:.0} s"
+            ))
+            .remedy_by(
+                Parameter::FrameRate,
+                format!("use a rate from {LEAST_FPS} to {MOST_FPS} Hz, and at most {MOST_SECONDS} s"),
+            ),
             Self::Ragged {
                 clip,
                 frame,

@@ -4,7 +4,7 @@ mod rate;
 
 use super::error::RetargetError;
 use super::options::{self, Options};
-use crate::clip::{Clip, LoopMode, MOST_FPS, Problem};
+use crate::clip::{Clip, LoopMode, Problem, length_flaw, rate_flaw};
 use crate::humanoid::{self, HumanoidMap};
 use crate::skeleton::{JointKind, Skeleton};
 use nalgebra::Isometry3;
@@ -85,10 +85,11 @@ fn check_clip(clip: &Clip) -> Result<(), RetargetError> {
     if clip.frames.is_empty() {
         return Err(RetargetError::Empty { clip: name() });
     }
-    if !(clip.fps > 0.0 && clip.fps <= MOST_FPS) {
+    if rate_flaw(clip.fps).is_some() || length_flaw(clip.duration()).is_some() {
         return Err(RetargetError::FrameRate {
             clip: name(),
             fps: clip.fps,
+            seconds: clip.duration(),
         });
     }
     let rest: Vec<_> = clip.joints.iter().map(|joint| joint.rest).collect();

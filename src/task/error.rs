@@ -1,6 +1,6 @@
 //! Why a task can't be set up or do what it is asked for.
 
-use crate::explain::{Explain, Explanation, explained};
+use crate::explain::{Explain, Explanation, Parameter, explained};
 use crate::motion::MotionError;
 use crate::schema::OutOfRange;
 use crate::sim::SimError;
@@ -33,6 +33,15 @@ pub enum TaskError {
     TooShort {
         /// How many it has.
         frames: usize,
+    },
+    /// A motion that lasts too long.
+    TooLong {
+        /// Its name.
+        motion: String,
+        /// How long it lasts, seconds.
+        seconds: f64,
+        /// How long it may last, seconds.
+        most: f64,
     },
     /// Motions that one policy can't learn together.
     OtherContacts {
@@ -96,6 +105,14 @@ impl Explain for TaskError {
                 Explanation::input(format!("the motion has {frames} {frame}"))
                     .remedy("give a motion of at least two frames")
             }
+            Self::TooLong {
+                motion,
+                seconds,
+                most,
+            } => Explanation::input(format!(
+                "motion `{motion}` lasts {seconds:.0} s, and one of at most {most:.0} s can be learned and evaluated"
+            ))
+            .remedy_by(Parameter::Trim, "give a part of its clip"),
             Self::OtherContacts { first, other } => Explanation::input(format!(
                 "motions `{first}` and `{other}` put different bodies on the ground, and one policy sees one set of contacts"
             ))

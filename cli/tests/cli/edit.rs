@@ -192,7 +192,7 @@ fn what_cannot_be_done_is_refused_with_a_remedy() {
             &["edit", "walk.clip", "--warp", "0.5:0.8,0.4:1"],
             "let both times rise",
         ),
-        (&["edit", "walk.clip", "--fps", "1e9"], "up to 10000"),
+        (&["edit", "walk.clip", "--fps", "1e9"], "to 10000"),
         (
             &["edit", "walk.motion", "--mirror"],
             "this is a motion, not a clip",

@@ -3,7 +3,7 @@
 use super::at_least;
 use super::figure::{Figure, moving};
 use super::seam::{Seam, Side, near};
-use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem};
+use crate::clip::{Clip, Error, Joint, LoopMode, MOST_TRANSFORMS, Problem, length_flaw};
 use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 
@@ -92,11 +92,15 @@ impl Clip {
     }
 
     fn check_room(&self, frames: usize) -> Result<(), Error> {
+        let duration = frames as f64 / self.fps;
+        if length_flaw(duration).is_some() {
+            return Err(Error::TooSlow { duration });
+        }
         if frames.saturating_mul(self.joints.len()) <= MOST_TRANSFORMS {
             return Ok(());
         }
         Err(Error::TooLong {
-            duration: frames as f64 / self.fps,
+            duration,
             fps: self.fps,
         })
     }

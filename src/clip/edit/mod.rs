@@ -18,7 +18,7 @@ mod warp;
 pub use cycle::Loop;
 pub use mirror::Plane;
 
-use super::sampling::MOST_FPS;
+use super::sampling::rate_flaw;
 use super::{Clip, Error, Problem};
 
 impl Clip {
@@ -41,8 +41,8 @@ impl Clip {
         if !joints.all(|(j, joint)| joint.parent.is_none_or(|p| p < j)) {
             return unusable("a joint comes before its parent");
         }
-        if !(self.fps > 0.0 && self.fps <= MOST_FPS) {
-            return unusable("its frame rate isn't a number from 0 to 10000");
+        if rate_flaw(self.fps).is_some() {
+            return unusable("its frame rate isn't a number from 0.1 to 10000");
         }
         Ok(())
     }

@@ -5,6 +5,9 @@ use crate::clip::{Clip, Error};
 /// Longest time that a point may have, seconds. Chosen: far more than can be sampled.
 const LONGEST: f64 = 1e9;
 
+/// Least time between two points, seconds. Chosen: shorter than the frames of any rate; quotients stay far from what numbers hold.
+const SHORTEST: f64 = 1e-6;
+
 /// Smallest factor of speed; a smaller one would stretch the shortest clip over days.
 const SLOWEST: f64 = 1e-6;
 
@@ -56,7 +59,7 @@ fn knots(points: &[(f64, f64)], duration: f64) -> Result<Vec<(f64, f64)>, Error>
         } else {
             from
         };
-        if !(to > before.0 && from > before.1 && from <= duration && to <= LONGEST) {
+        if !(to >= before.0 + SHORTEST && from > before.1 && from <= duration && to <= LONGEST) {
             return Err(Error::Warp { from, to, duration });
         }
         knots.push((to, from));

@@ -16,6 +16,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 /// 1 − cos(ω/2f): at 12 rad/s by 0.1 % in a table of 120 Hz, and by 7 % in one of a clip's own
 /// 16 Hz.
 const TABLE_HZ: f64 = 120.0;
+/// Most frames of the table, each of some 4 kB. Chosen: 20 minutes at [`TABLE_HZ`], several times what can be evaluated.
+const MOST_TABLE: f64 = 144_000.0;
 /// The reference's velocities are means over this many seconds on either side, one control step: no drive can follow what
 /// comes and goes faster, and in recordings it is mostly noise.
 const AVERAGED_S: f64 = 1.0 / 30.0;
@@ -63,7 +65,15 @@ impl Reference {
         }
         let finer = (TABLE_HZ / motion.fps).ceil().max(1.0);
         let rate = motion.fps * finer;
-        let count = (motion.qpos.len() - 1) * finer as usize + 1;
+        let count = (motion.qpos.len() - 1) as f64 * finer + 1.0;
+        if count.is_nan() || count > MOST_TABLE {
+            return Err(TaskError::TooLong {
+                motion: motion.name.clone(),
+                seconds: motion.duration(),
+                most: MOST_TABLE / rate,
+            });
+        }
+        let count = count as usize;
         let duration = motion.duration();
         let times = || (0..count).map(|f| (f as f64 / rate).min(duration));
         let contact = |time| {
