@@ -125,9 +125,9 @@ impl Checkpoint {
         let reader = Reader::open(bytes, CHECKPOINT)?;
         let header: CheckpointHeader = reader.fields()?;
         let policy = Policy::new(header.policy).map_err(misfit)?;
-        let [mean, square, batches] = reader.array("value_scale")?;
+        let [mean, square, batches] = finite_array(&reader, "value_scale")?;
         let [steps] = reader.array("adam.steps")?;
-        let [learning_rate] = reader.array("learning_rate")?;
+        let [learning_rate] = finite_array(&reader, "learning_rate")?;
         let adam = Adam {
             mean: parameters(&reader, "adam.mean.", &policy)?,
             square: parameters(&reader, "adam.square.", &policy)?,
@@ -270,12 +270,19 @@ fn finite<T: Copy + Into<f64>>(name: &str, values: Vec<T>) -> Result<Vec<T>, Fla
     }
 }
 
+/// A tensor of exactly `N` numbers, all finite.
+fn finite_array<const N: usize>(reader: &Reader, name: &str) -> Result<[f64; N], Flaw> {
+    let values: [f64; N] = reader.array(name)?;
+    finite(name, values.to_vec()).map(|_| values)
+}
+
 fn extra(reader: &Reader) -> Result<BTreeMap<String, Vec<f32>>, Flaw> {
     let named = reader.names().filter_map(|name| {
         let rest = name.strip_prefix(EXTRA)?;
         Some(
             reader
                 .tensor(name, &[None])
+                .and_then(|values| finite(name, values))
                 .map(|values| (rest.to_owned(), values)),
         )
     });

@@ -8,9 +8,10 @@ use super::model::CharacterModel;
 use crate::motion::Motion;
 use crate::sim::Settings;
 use schemars::JsonSchema;
-use serde::de::Error;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeSeed, Error, IntoDeserializer, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::Value;
+use std::fmt;
 use std::sync::Arc;
 
 /// Names of the tasks, each with what it is, the default first.
@@ -112,18 +113,51 @@ impl From<ImitationSettings> for TaskSettings {
 
 impl<'de> Deserialize<'de> for TaskSettings {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut settings = Value::deserialize(deserializer)?;
-        let kind = settings.as_object_mut().and_then(|s| s.remove("kind"));
-        match kind.as_ref().map(|kind| kind.as_str().unwrap_or_default()) {
-            None | Some(imitate::NAME) => serde_json::from_value(settings)
-                .map(Self::Imitate)
-                .map_err(|e| D::Error::custom(format!("task: {e}"))),
-            Some(other) => {
+        deserializer.deserialize_map(Named)
+    }
+}
+
+/// Reads the settings of a task as they stand, beside its name: kept until the name is known, a large file would fill the memory.
+struct Named;
+
+impl<'de> Visitor<'de> for Named {
+    type Value = TaskSettings;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("the settings of a task")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<TaskSettings, A::Error> {
+        let settings = MapAccessDeserializer::new(WithoutKind(map));
+        ImitationSettings::deserialize(settings).map(TaskSettings::Imitate)
+    }
+}
+
+/// The fields of an object but for `kind`, which has to be the name of a task.
+struct WithoutKind<A>(A);
+
+impl<'de, A: MapAccess<'de>> MapAccess<'de> for WithoutKind<A> {
+    type Error = A::Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, A::Error> {
+        while let Some(key) = self.0.next_key::<String>()? {
+            if key != "kind" {
+                return seed.deserialize(key.into_deserializer()).map(Some);
+            }
+            let kind: String = self.0.next_value()?;
+            if kind != imitate::NAME {
                 let known = TASKS.map(|(name, _)| name).join(", ");
-                Err(D::Error::custom(format!(
-                    "task: there is no task `{other}`; use one of {known}"
-                )))
+                let cause = format!("task: there is no task `{kind}`; use one of {known}");
+                return Err(A::Error::custom(cause));
             }
         }
+        Ok(None)
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, A::Error> {
+        self.0.next_value_seed(seed)
     }
 }

@@ -6,10 +6,11 @@ use crate::sim::Settings;
 use crate::task::disturbance::Perturbations;
 use crate::task::error::TaskError;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// What the network's output means.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Actions {
     /// The output is a rotation that is added to the reference's own joint targets.
@@ -34,6 +35,46 @@ pub enum Actions {
         #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0))]
         reach: f32,
     },
+}
+
+/// [`Actions`] as they are read: field by field, so that one of another name is found, and takes no memory.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ActionFields {
+    kind: ActionKind,
+    scale: Option<f32>,
+    reach: Option<f32>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ActionKind {
+    Residual,
+    Absolute,
+    FromRest,
+}
+
+impl<'de> Deserialize<'de> for Actions {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use ActionKind::{Absolute, FromRest, Residual};
+        let fields = ActionFields::deserialize(deserializer)?;
+        let missing = D::Error::missing_field;
+        match (fields.kind, fields.scale, fields.reach) {
+            (Residual, _, Some(_)) => Err(D::Error::unknown_field("reach", &["kind", "scale"])),
+            (Absolute | FromRest, Some(_), _) => {
+                Err(D::Error::unknown_field("scale", &["kind", "reach"]))
+            }
+            (Residual, scale, None) => Ok(Self::Residual {
+                scale: scale.ok_or_else(|| missing("scale"))?,
+            }),
+            (Absolute, None, reach) => Ok(Self::Absolute {
+                reach: reach.ok_or_else(|| missing("reach"))?,
+            }),
+            (FromRest, None, reach) => Ok(Self::FromRest {
+                reach: reach.ok_or_else(|| missing("reach"))?,
+            }),
+        }
+    }
 }
 
 /// What the policy sees; see [`super::layout`] for the blocks of each.

@@ -7,7 +7,7 @@ use mimic::file::text_at_most;
 use mimic::run::{PRESETS, Plan, RunError, files, preset};
 use mimic::task::TaskSettings;
 use serde::Deserialize;
-use serde_json::Value;
+use serde::de::IgnoredAny;
 use std::path::{Path, PathBuf};
 
 /// Most bytes that a file of settings may have. Chosen: a run's own has three thousand.
@@ -19,8 +19,15 @@ pub struct Preset {
     pub plan: Plan,
     /// The character that the settings are made for, if any.
     pub skeleton: Option<&'static str>,
-    /// The file of the settings; `None` for those that are built in.
-    file: Option<PathBuf>,
+    /// The file of the settings, and the error that they would make by themselves; `None` for those that are built in.
+    file: Option<(PathBuf, Option<String>)>,
+}
+
+/// Whether a plan stands in an object with other things. What it holds is passed over: read whole, it would take many times the
+/// memory of the file.
+#[derive(Deserialize)]
+struct Nested {
+    plan: Option<IgnoredAny>,
 }
 
 /// The part of a run's `config.json` that is read here.
@@ -52,10 +59,11 @@ impl Preset {
             return Err(Failure::input(&file, "the number of samples is 0")
                 .with_remedy("set `samples` to 1 or more"));
         }
+        let own = plan.check().err().map(|error| error.to_string());
         Ok(Self {
             plan,
             skeleton: None,
-            file: Some(file),
+            file: Some((file, own)),
         })
     }
 
@@ -85,7 +93,13 @@ impl Preset {
 
     /// The failure of a run that cannot be made with these settings.
     pub fn failure(&self, error: RunError) -> Failure {
-        failure(self.file.as_deref(), error)
+        // What a change of the command line made wrong isn't the file's fault.
+        let said = error.to_string();
+        let blamed = self
+            .file
+            .as_ref()
+            .filter(|(_, own)| own.as_ref() == Some(&said));
+        failure(blamed.map(|(file, _)| file.as_path()), error)
     }
 }
 
@@ -118,8 +132,9 @@ fn file(wanted: &Path) -> Outcome<PathBuf> {
 
 /// Reads a plan, alone or in a run's configuration. Both are read from the text, so that errors say line and column.
 fn parse(text: &str) -> serde_json::Result<Plan> {
-    let value: Value = serde_json::from_str(text)?;
-    if value.get("plan").is_some() {
+    let _: IgnoredAny = serde_json::from_str(text)?;
+    let nested = serde_json::from_str::<Nested>(text).is_ok_and(|nested| nested.plan.is_some());
+    if nested {
         return serde_json::from_str(text).map(|Config { plan }| plan);
     }
     serde_json::from_str(text)
