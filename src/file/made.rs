@@ -11,23 +11,44 @@ use std::path::Path;
 #[derive(Serialize, Deserialize)]
 pub(super) struct Made {
     by: String,
-    /// Lower-case hexadecimal SHA-256 of the tensors' bytes.
+    /// Lower-case hexadecimal SHA-256 of all of the file but this field.
     sha256: String,
 }
 
 impl Made {
-    /// Of a file with these bytes of tensors.
-    pub(super) fn new(by: &str, tensors: &[u8]) -> Self {
-        Self {
+    /// Of a file that is the same as these bytes but for this field. `None` for bytes that are cut short.
+    pub(super) fn new(by: &str, plain: &[u8]) -> Option<Self> {
+        let (header, tensors) = parts(plain)?;
+        Some(Self {
             by: by.to_owned(),
-            sha256: format!("{:x}", Sha256::digest(tensors)),
-        }
+            sha256: digest(std::str::from_utf8(header).ok()?, tensors),
+        })
+    }
+
+    /// The digest of a file with this field in it, as it is now.
+    fn of_now(&self, bytes: &[u8]) -> Option<String> {
+        let (header, tensors) = parts(bytes)?;
+        // The field as it stands in the header: as JSON, in a string of JSON.
+        let field = format!("\"made\":{},", serde_json::to_string(self).ok()?);
+        let quoted = serde_json::to_string(&field).ok()?;
+        let header = std::str::from_utf8(header).ok()?;
+        let (before, after) = header.split_once(quoted.trim_matches('"'))?;
+        Some(digest(&format!("{before}{after}"), tensors))
     }
 }
 
+/// Of a file with this header, which is filled up with blanks, and these bytes of tensors.
+fn digest(header: &str, tensors: &[u8]) -> String {
+    let mut digest = Sha256::new();
+    for part in [header.trim_end().as_bytes(), b"\n", tensors] {
+        digest.update(part);
+    }
+    format!("{:x}", digest.finalize())
+}
+
 /// The text that says what made a file of tensors, as it was given to [`Clip::to_bytes`](crate::clip::Clip::to_bytes) or
-/// [`Motion::to_bytes`](crate::motion::Motion::to_bytes). `None` if the file doesn't say, can't be read, or has other
-/// tensors than it was made with.
+/// [`Motion::to_bytes`](crate::motion::Motion::to_bytes). `None` if the file doesn't say, can't be read, or isn't as it was made,
+/// in its tensors or in its metadata.
 pub fn made_by(path: impl AsRef<Path>) -> Option<String> {
     #[derive(Deserialize)]
     struct Fields {
@@ -35,8 +56,7 @@ pub fn made_by(path: impl AsRef<Path>) -> Option<String> {
     }
     let bytes = read_at_most(path, MOST_BYTES).ok()?;
     let Fields { made } = serde_json::from_str(&header(&bytes).ok()?).ok()?;
-    let (_, tensors) = parts(&bytes)?;
-    (Made::new(&made.by, tensors).sha256 == made.sha256).then_some(made.by)
+    (made.of_now(&bytes)? == made.sha256).then_some(made.by)
 }
 
 /// Whether the file of tensors at `path` holds what these bytes of another hold, whatever the two say of what made them.

@@ -87,11 +87,7 @@ impl Writer {
         made: Option<&str>,
     ) -> Result<Vec<u8>, Flaw> {
         let plain = self.stamped(format, fields, None)?;
-        let tensors = parts(&plain).map(|(_, tensors)| tensors);
-        let Some(made) = made
-            .zip(tensors)
-            .map(|(by, tensors)| Made::new(by, tensors))
-        else {
+        let Some(made) = made.and_then(|by| Made::new(by, &plain)) else {
             return Ok(plain);
         };
         drop(plain);

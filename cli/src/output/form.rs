@@ -1,9 +1,8 @@
 //! The forms of results, and where each says what made it.
 
+use super::maker::Mark;
 use mimic::file::read_at_most;
 use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// What a result is.
@@ -95,35 +94,47 @@ impl Form {
     }
 
     /// Whether the file at `path` bears this mark, and is as it was when it got it.
-    pub fn is_marked_with(self, path: &Path, mark: &str) -> bool {
-        match self {
-            Self::Clip | Self::Motion => mimic::file::made_by(path).as_deref() == Some(mark),
-            Self::Recording => start(path, HEAD).is_some_and(|bytes| {
-                let id = recording_id(mark);
-                bytes.windows(id.len()).any(|some| some == id.as_bytes())
-            }),
-            _ => self.is_text_marked_with(path, mark),
-        }
+    pub fn is_marked_with(self, path: &Path, mark: &Mark) -> bool {
+        let found = match self {
+            Self::Clip | Self::Motion => mimic::file::made_by(path),
+            Self::Recording => mark_of_recording(path, mark),
+            _ => self.mark_of_text(path),
+        };
+        found.is_some_and(|found| mark.fits(&found))
     }
 
-    fn is_text_marked_with(self, path: &Path, mark: &str) -> bool {
+    /// The mark of a text that nobody changed since.
+    fn mark_of_text(self, path: &Path) -> Option<String> {
         let text = start(path, MOST_TEXT).and_then(|bytes| String::from_utf8(bytes).ok());
         let parts = text.as_deref().and_then(|text| {
             let (first, rest) = text.split_once('\n')?;
             let (made, rest) = rest.split_once('\n')?;
             Some((first, made, rest))
         });
-        let (Some((open, close)), Some((first, made, rest))) = (self.frame(), parts) else {
-            return false;
-        };
-        made == format!("{open}{mark} {}{close}", digest(first, rest))
+        let ((open, close), (first, made, rest)) = (self.frame()?, parts?);
+        let made = made.strip_prefix(open)?.strip_suffix(close)?;
+        let (mark, stated) = made.split_once(' ')?;
+        (stated == digest(first, rest)).then(|| mark.to_owned())
     }
+}
+
+/// The mark in a recording, if it is of the same maker.
+fn mark_of_recording(path: &Path, mark: &Mark) -> Option<String> {
+    let bytes = start(path, HEAD)?;
+    let id = format!("{ID}{}", mark.maker());
+    let at = bytes
+        .windows(id.len())
+        .position(|some| some == id.as_bytes())?;
+    let found = bytes.get(at + ID.len()..)?.get(..mark.to_string().len())?;
+    String::from_utf8(found.to_vec()).ok()
 }
 
 /// What the id of a recording begins with, which is where it says what made it.
 pub fn recording_id(mark: &str) -> String {
-    format!("mimic-{mark}-")
+    format!("{ID}{mark}-")
 }
+
+const ID: &str = "mimic-";
 
 /// Of a text without the line of its mark.
 fn digest(first: &str, rest: &str) -> String {
@@ -136,10 +147,7 @@ fn digest(first: &str, rest: &str) -> String {
 
 /// The first bytes of a file.
 fn start(path: &Path, most: u64) -> Option<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let mut file = File::open(path).ok()?.take(most);
-    file.read_to_end(&mut bytes).ok()?;
-    Some(bytes)
+    mimic::file::start_of(path, most).ok()
 }
 
 #[cfg(test)]
@@ -154,21 +162,24 @@ mod tests {
             (Form::Drawing, "<svg>\n<rect/>\n</svg>\n"),
             (Form::Page, ".TH mimic 1\n.SH NAME\n"),
         ] {
-            let marked = form.marked(text, "abc");
+            let marked = form.marked(text, "a-b-c");
             let holds = |text: &str, mark: &str| {
                 std::fs::write(&path, text).expect("written");
-                form.is_marked_with(&path, mark)
+                form.mark_of_text(&path).as_deref() == Some(mark)
             };
-            assert!(holds(&marked, "abc"), "{marked}");
-            assert!(!holds(&marked, "abd") && !holds(text, "abc"), "{marked}");
+            assert!(holds(&marked, "a-b-c"), "{marked}");
+            assert!(
+                !holds(&marked, "a-b-d") && !holds(text, "a-b-c"),
+                "{marked}"
+            );
             for (old, new) in [("1", "2"), ("rect", "path"), ("made", "mads")] {
                 let changed = marked.replacen(old, new, 1);
-                assert!(changed == marked || !holds(&changed, "abc"), "{changed}");
+                assert!(changed == marked || !holds(&changed, "a-b-c"), "{changed}");
             }
         }
         // What other programs read has nothing in it but what they expect.
         for form in [Form::Table, Form::Map, Form::Evaluation] {
-            assert_eq!(form.marked("a\nb\n", "abc"), "a\nb\n");
+            assert_eq!(form.marked("a\nb\n", "a-b-c"), "a\nb\n");
         }
     }
 }

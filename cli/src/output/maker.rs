@@ -1,6 +1,10 @@
 //! What makes a result.
 
+use mimic::run::files;
 use sha2::{Digest, Sha256};
+use std::fmt;
+use std::fs::File;
+use std::io;
 use std::iter::repeat_n;
 use std::path::{Component, Path, PathBuf};
 
@@ -56,25 +60,79 @@ impl Maker {
         self.inputs.iter().map(PathBuf::as_path)
     }
 
-    /// What a result at `path` says about its maker: a digest, because a file that is handed on shouldn't tell the paths of
-    /// a disk. Inputs count by where they are relative to the result, so that both can move together, and not by what is in
-    /// them: a clip that was exported again is the same source. `None` where folder or inputs can't be found.
-    pub fn mark(&self, path: &Path) -> Option<String> {
+    /// What a result at `path` says about its maker. `None` where folder or inputs can't be found.
+    pub fn mark(&self, path: &Path) -> Option<Mark> {
         let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-        let mut digest = Sha256::new();
-        let mut add = |bytes: &[u8]| {
-            digest.update((bytes.len() as u64).to_le_bytes());
-            digest.update(bytes);
-        };
-        add(self.verb.as_bytes());
-        add(self.detail.as_bytes());
+        let [mut maker, mut origin, mut content] = [(); 3].map(|()| Parts::default());
+        maker.add(self.verb.as_bytes());
+        maker.add(self.detail.as_bytes());
         for input in &self.inputs {
-            let place = relative(&folder, &input.canonicalize().ok()?);
-            add(place.as_os_str().as_encoded_bytes());
+            let input = input.canonicalize().ok()?;
+            maker.add(relative(&folder, &input).as_os_str().as_encoded_bytes());
+            origin.add(input.as_os_str().as_encoded_bytes());
+            content.add(&held(&input));
         }
-        Some(format!("{:x}", digest.finalize()))
+        Some(Mark([maker, origin, content].map(Parts::text)))
     }
+}
+
+/// What a result says about its maker, in digests, because a file that is handed on shouldn't tell the paths of a disk: the verb
+/// with where its inputs are relative to the result; where they are on the disk; and what is in them.
+#[derive(Debug, PartialEq)]
+pub struct Mark([String; 3]);
+
+impl Mark {
+    /// The digest that no two makers share.
+    pub fn maker(&self) -> &str {
+        &self.0[0]
+    }
+
+    /// Whether a result with the mark `found` is of the same maker: the inputs are at the same place and were exported again,
+    /// perhaps, or they are elsewhere, as both were moved, and hold the same. Namesakes in another folder are neither.
+    pub fn fits(&self, found: &str) -> bool {
+        let Self([maker, origin, content]) = self;
+        match found.split('-').collect::<Vec<_>>()[..] {
+            [by, at, held] => by == maker && (at == origin || held == content),
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for Mark {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.0.join("-"))
+    }
+}
+
+/// The digest of several pieces.
+#[derive(Default)]
+struct Parts(Sha256);
+
+impl Parts {
+    fn add(&mut self, bytes: &[u8]) {
+        self.0.update((bytes.len() as u64).to_le_bytes());
+        self.0.update(bytes);
+    }
+
+    fn text(self) -> String {
+        format!("{:x}", self.0.finalize()).split_off(32)
+    }
+}
+
+/// Digest of what is in an input: a file, or the files of a run that make it what it is. What can't be read counts as empty.
+fn held(input: &Path) -> Vec<u8> {
+    let files = match input.is_dir() {
+        true => vec![input.join(files::CONFIG), input.join(files::POLICY)],
+        false => vec![input.to_owned()],
+    };
+    let mut digest = Sha256::new();
+    for file in files.iter().filter(|file| file.is_file()) {
+        File::open(file)
+            .and_then(|mut file| io::copy(&mut file, &mut digest))
+            .ok();
+    }
+    digest.finalize().to_vec()
 }
 
 /// The way from one place to another; the other's whole path where there is none, as between two drives.
@@ -138,12 +196,19 @@ mod tests {
         let (first, second) = (file("a/walk.bvh"), file("b/walk.bvh"));
         let moved = file("elsewhere/a/walk.bvh");
         let own = mark("import", &first, "", "walk.clip").expect("it exists");
-        assert_eq!(own.len(), 64, "{own}");
-        let same = |other: Option<String>| other.as_ref() == Some(&own);
+        let same = |other: Option<Mark>| other.is_some_and(|other| other.fits(&own.to_string()));
+        // Moved, but another one: each file holds its own name.
+        assert!(!same(mark("import", &moved, "", "elsewhere/walk.clip")));
+        std::fs::copy(&first, &moved).expect("copied");
         assert!(same(mark("import", &moved, "", "elsewhere/walk.clip")));
         assert!(!same(mark("import", &second, "", "walk.clip")));
         assert!(!same(mark("edit", &first, "", "walk.clip")));
         assert!(!same(mark("import", &first, "run", "walk.clip")));
         assert_eq!(mark("import", &first, "", "no/walk.clip"), None);
+        std::fs::write(&first, "exported again").expect("written");
+        assert!(same(mark("import", &first, "", "walk.clip")));
+        for other in ["", "a-b", &own.to_string().replace('-', "")] {
+            assert!(!own.fits(other), "{other}");
+        }
     }
 }

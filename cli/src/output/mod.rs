@@ -10,6 +10,7 @@ pub use maker::Maker;
 
 use crate::failure::{Failure, Outcome};
 use crate::locate;
+use maker::Mark;
 use mimic::file::Unfinished;
 use mimic::run::files;
 use std::io::{self, Write};
@@ -57,7 +58,7 @@ impl Output {
         }
         self.spare_run()?;
         let is_clear = self.force || !is_taken(path) || !self.form.is_judged_by_mark();
-        match is_clear || self.is_ours(self.mark().as_deref()) {
+        match is_clear || self.is_ours(self.mark().as_ref()) {
             true => Ok(()),
             false => Err(self.refused()),
         }
@@ -65,10 +66,19 @@ impl Output {
 
     /// Writes these bytes, which may hold what made them.
     pub fn write(&self, bytes: impl FnOnce(Option<&str>) -> Outcome<Vec<u8>>) -> Outcome {
-        self.make_folder()?;
+        let made = self.make_folder()?;
+        let written = self.write_here(bytes);
+        if written.is_err() {
+            unmake(&made);
+        }
+        written
+    }
+
+    fn write_here(&self, bytes: impl FnOnce(Option<&str>) -> Outcome<Vec<u8>>) -> Outcome {
         self.check()?;
         let mark = self.mark();
-        let bytes = bytes(mark.as_deref())?;
+        let text = mark.as_ref().map(Mark::to_string);
+        let bytes = bytes(text.as_deref())?;
         // Before anything else: this tidies the folder, too.
         let mut file = Unfinished::beside(&self.path).map_err(|e| self.unwritten(e))?;
         if is_taken(&self.path) && self.form.holds(&self.path, &bytes) {
@@ -76,7 +86,7 @@ impl Output {
         }
         let written = file.file().write_all(&bytes);
         written.map_err(|e| self.unwritten(e))?;
-        self.settle(file, mark.as_deref())
+        self.settle(file, mark.as_ref())
     }
 
     /// Writes a text, with what made it where the form has a place for that.
@@ -91,7 +101,7 @@ impl Output {
     }
 
     /// Gives the file its name. A file that appeared there since the check is refused as it would have been then.
-    fn settle(&self, file: Unfinished, mark: Option<&str>) -> Outcome {
+    fn settle(&self, file: Unfinished, mark: Option<&Mark>) -> Outcome {
         if self.force || self.is_ours(mark) {
             return file.replace().map_err(|e| self.unwritten(e));
         }
@@ -101,20 +111,20 @@ impl Output {
         })
     }
 
-    fn make_folder(&self) -> Outcome {
+    fn make_folder(&self) -> Outcome<Vec<PathBuf>> {
         let folder = self.path.parent().filter(|f| !f.as_os_str().is_empty());
         match folder {
             Some(folder) => make_folder(folder),
-            None => Ok(()),
+            None => Ok(Vec::new()),
         }
     }
 
-    fn mark(&self) -> Option<String> {
+    fn mark(&self) -> Option<Mark> {
         self.maker.mark(&self.path)
     }
 
     /// Whether what is there says that the same command made it.
-    fn is_ours(&self, mark: Option<&str>) -> bool {
+    fn is_ours(&self, mark: Option<&Mark>) -> bool {
         mark.is_some_and(|mark| self.form.is_marked_with(&self.path, mark))
     }
 
@@ -193,15 +203,36 @@ fn is_taken(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
 }
 
-/// Makes a folder for results, and those that it is in.
-pub fn make_folder(folder: &Path) -> Outcome {
-    if folder.is_file() {
-        let cause = "this is a file, and the result needs a folder";
+/// Makes a folder for results, and those that it is in. Returns those that weren't there, the innermost first.
+pub fn make_folder(folder: &Path) -> Outcome<Vec<PathBuf>> {
+    let is_named = |path: &&Path| !path.as_os_str().is_empty();
+    let missing = folder.ancestors().filter(is_named);
+    let missing: Vec<PathBuf> = missing
+        .take_while(|path| !path.is_dir())
+        .map(Path::to_owned)
+        .collect();
+    // A file in the way, a pipe, or a link that leads nowhere.
+    if let Some(taken) = missing.iter().find(|path| is_taken(path)) {
+        let cause = match taken.is_file() {
+            true => "this is a file, and the result needs a folder",
+            false => "this is not a folder, and the result needs one",
+        };
         return Err(
-            Failure::input(folder, cause).with_remedy("name another folder with `--out FOLDER/`")
+            Failure::input(taken, cause).with_remedy("name another folder with `--out FOLDER/`")
         );
     }
-    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))
+    std::fs::create_dir_all(folder).map_err(|e| {
+        unmake(&missing);
+        Failure::write(folder, e)
+    })?;
+    Ok(missing)
+}
+
+/// Removes folders that were made for what couldn't be written. Those with something in them stay.
+pub fn unmake(made: &[PathBuf]) {
+    for folder in made {
+        std::fs::remove_dir(folder).ok();
+    }
 }
 
 /// Path of a result: the file that `--out` names, or `NAME.EXTENSION` in the folder that it names, or in this folder.

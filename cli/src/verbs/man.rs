@@ -2,7 +2,7 @@
 
 use crate::args::Replace;
 use crate::failure::{Failure, Outcome};
-use crate::output::{Form, Maker, Output, make_folder};
+use crate::output::{Form, Maker, Output, make_folder, unmake};
 use crate::printer::Printer;
 use clap::Command;
 use clap_mangen::Man;
@@ -40,8 +40,8 @@ impl Args {
 }
 
 fn write_pages(command: &Command, folder: &Path, force: bool) -> Outcome<Vec<String>> {
-    make_folder(folder)?;
-    std::iter::once(command)
+    let made = make_folder(folder)?;
+    let pages: Outcome<Vec<String>> = std::iter::once(command)
         .chain(command.get_subcommands())
         .map(|command| {
             let name = command.get_display_name().unwrap_or(command.get_name());
@@ -51,7 +51,11 @@ fn write_pages(command: &Command, folder: &Path, force: bool) -> Outcome<Vec<Str
             output.write_text(&page(command.clone())?)?;
             Ok(output.path().display().to_string())
         })
-        .collect()
+        .collect();
+    if pages.is_err() {
+        unmake(&made);
+    }
+    pages
 }
 
 fn page(command: Command) -> Outcome<String> {

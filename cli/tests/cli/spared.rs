@@ -1,6 +1,7 @@
 //! A result takes the place of what the same command made from the same input, and of nothing else.
 
 use crate::workbench::Workbench;
+use sha2::{Digest, Sha256};
 use std::fs;
 
 /// Two clips of one name, in the folders `a` and `b`: `b` sways twice as fast.
@@ -373,14 +374,32 @@ fn unfinished_files_of_killed_processes_are_removed() {
         .expect("it starts");
     let number = dead.id();
     dead.wait().expect("it ends");
-    bench.write(".mimic-mine", b"somebody's own");
+    // Nobody's files but ours have names that are sealed.
+    let sealed = |random: &str| {
+        let own = format!("{number}-{random}");
+        let digest = Sha256::digest(format!("an unfinished file of mimic, {own}"));
+        format!(".mimic-{own}-{}", &format!("{digest:x}")[48..])
+    };
+    let others = [
+        ".mimic-2024-backup".to_owned(),
+        ".mimic-99999-config".to_owned(),
+        format!(".mimic-{number}-Ab3dEf"),
+        ".mimic-mine".to_owned(),
+    ];
+    for name in &others {
+        bench.write(name, b"somebody's own");
+    }
     // The second time it is there already.
     for _ in 0..2 {
-        for name in ["Ab3dEf", "zzzzzz"] {
-            bench.write(&format!(".mimic-{number}-{name}"), b"half");
+        for random in ["0123456789abcdef", "fedcba9876543210"] {
+            bench.write(&sealed(random), b"half");
         }
         bench.mimic(&["import", "sway.txt"]).assert().success();
-        assert_eq!(leftovers(&bench), [".mimic-mine"]);
+        let mut left = leftovers(&bench);
+        left.sort();
+        let mut kept = others.to_vec();
+        kept.sort();
+        assert_eq!(left, kept);
     }
 }
 
@@ -511,5 +530,83 @@ fn names_that_no_file_can_have_are_refused() {
     ] {
         let said = bench.complaint(line, 2);
         assert!(said.len() < 20_000, "{}", said.len());
+    }
+}
+
+/// A result whose metadata somebody changed is theirs.
+#[test]
+fn what_is_changed_in_any_part_stays() {
+    let bench = Workbench::with_clip();
+    for (line, file, fields) in [
+        (
+            ["import", "sway.txt"],
+            "sway.clip",
+            &[r#"\"name\":\"sway\""#, r#"\"loop\":\"wrap\""#, "rootjoint"][..],
+        ),
+        (
+            ["retarget", "sway.txt"],
+            "sway.motion",
+            &[r#"\"name\":\"sway\""#, r#"\"loop\":\"wrap\""#],
+        ),
+    ] {
+        for field in fields {
+            bench.mimic(&line).arg("--force").assert().success();
+            // The same once more is no change.
+            bench.mimic(&line).assert().success();
+            let bytes = fs::read(bench.path(file)).expect("it is there");
+            let at = bytes
+                .windows(field.len())
+                .position(|some| some == field.as_bytes());
+            let Some(at) = at else {
+                // What a format calls its joints is no concern of this test.
+                continue;
+            };
+            let mut changed = bytes.clone();
+            let letter = at + field.len() - 3;
+            changed[letter] = if changed[letter] == b'a' { b'b' } else { b'a' };
+            if field.contains("loop") {
+                changed = bytes.clone();
+                changed[at..at + field.len()].copy_from_slice(br#"\"loop\":\"wrap\""#);
+                changed[at + 11..at + 15].copy_from_slice(b"clam");
+            }
+            bench.write(file, &changed);
+            let error = bench.error_about(file, &line, 2);
+            assert!(error["remedy"].to_string().contains("--force"), "{error}");
+            assert_eq!(fs::read(bench.path(file)).ok(), Some(changed), "{field}");
+        }
+    }
+}
+
+/// A result that is put beside another source of the same name was made from the first.
+#[test]
+fn a_result_that_was_moved_beside_a_namesake_stays() {
+    let bench = with_namesakes();
+    let at = |folder: &str, line: &[&str]| {
+        let mut command = bench.mimic(line);
+        command.current_dir(bench.path(folder));
+        command
+    };
+    for (line, file) in [
+        (&["import", "sway.txt"][..], "sway.clip"),
+        (&["retarget", "sway.txt"], "sway.motion"),
+        (&["tracks", "sway.txt", "--plot", "sway.svg"], "sway.svg"),
+        #[cfg(feature = "rerun")]
+        (&["replay", "sway.txt", "--save", "sway.rrd"], "sway.rrd"),
+    ] {
+        at("a", line).assert().success();
+        // Exported again, at the same place.
+        let text = fs::read(bench.path("a/sway.txt")).expect("it is there");
+        fs::write(bench.path("a/sway.txt"), [&text[..], b"\n"].concat()).expect("written");
+        at("a", line).assert().success();
+        let [from, to] = ["a", "b"].map(|folder| bench.path(folder).join(file));
+        fs::rename(from, &to).expect("moved");
+        let before = fs::read(&to).expect("it is there");
+        at("b", line).assert().code(2);
+        assert_eq!(fs::read(&to).ok(), Some(before), "{file}");
+        // Both moved together are as they were.
+        fs::create_dir_all(bench.path("c")).expect("a folder");
+        fs::copy(bench.path("a/sway.txt"), bench.path("c/sway.txt")).expect("copied");
+        fs::rename(&to, bench.path("c").join(file)).expect("moved");
+        at("c", line).assert().success();
     }
 }
