@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, Outcome};
 use crate::shell;
+use mimic::file::Lock;
 use mimic::run::files;
 use std::fs;
 use std::io;
@@ -51,8 +52,13 @@ pub fn file(wanted: &Path, library: &Path, extensions: &[&str]) -> Outcome<PathB
 
 /// Whether there is anything of this name. What we may not look at is there, but can't be read.
 fn is_there(path: &Path) -> Outcome<bool> {
-    match fs::metadata(path) {
-        Ok(_) => Ok(true),
+    is_there_by(path, fs::metadata(path).map(|_| ()))
+}
+
+/// The same, by what the system said when it was asked for something there.
+fn is_there_by(path: &Path, asked: io::Result<()>) -> Outcome<bool> {
+    match asked {
+        Ok(()) => Ok(true),
         Err(e) if is_absence(&e) => Ok(false),
         Err(e) => Err(Failure::unreadable(path, &e)),
     }
@@ -125,22 +131,42 @@ pub fn run(wanted: Option<&Path>) -> Outcome<PathBuf> {
         Some(wanted) => match existing_run(wanted) {
             Some(run) => Ok(run),
             None => {
-                is_there(&wanted.join(files::CONFIG))?;
+                for place in places(wanted) {
+                    is_there(&place.join(files::CONFIG))?;
+                }
                 Err(absent_run(wanted))
             }
         },
-        None => newest_run().ok_or_else(|| {
-            Failure::user(format!("there is no run in `{RUNS}/`"))
-                .with_remedy("make one with `mimic train CLIP`")
-        }),
+        None => {
+            // What can't be listed may well hold runs.
+            if let Err(e) = fs::read_dir(RUNS) {
+                is_there_by(Path::new(RUNS), Err(e))?;
+            }
+            newest_run().ok_or_else(no_run)
+        }
+    }
+}
+
+/// The failure of a command that takes the newest run, where none was saved.
+fn no_run() -> Failure {
+    let begun = runs(Path::new(RUNS)).into_iter().find(|path| is_run(path));
+    match begun {
+        Some(run) => Failure::input(&run, "nothing was saved of this run yet")
+            .with_remedy("wait for the end of its first round, or resume its training"),
+        None => Failure::user(format!("there is no run in `{RUNS}/`"))
+            .with_remedy("make one with `mimic train CLIP`"),
     }
 }
 
 /// The run that `wanted` means, if there is one.
 pub fn existing_run(wanted: &Path) -> Option<PathBuf> {
+    places(wanted).find(|path| is_run(path))
+}
+
+/// Where the run may be that `wanted` means.
+fn places(wanted: &Path) -> impl Iterator<Item = PathBuf> {
     let named = is_name(wanted).then(|| Path::new(RUNS).join(wanted));
-    let places = std::iter::once(wanted.to_path_buf()).chain(named);
-    places.into_iter().find(|path| is_run(path))
+    std::iter::once(wanted.to_path_buf()).chain(named)
 }
 
 /// Whether a folder holds a run.
@@ -148,7 +174,7 @@ pub fn is_run(path: &Path) -> bool {
     path.join(files::CONFIG).is_file()
 }
 
-/// The runs in a folder, by name, and what is left of runs: folders with any of a run's own files in it.
+/// The runs in a folder, by name, what is left of runs: folders with any of a run's own files in it, and what will be one.
 pub fn runs(folder: &Path) -> Vec<PathBuf> {
     let own = [
         files::CONFIG,
@@ -156,7 +182,14 @@ pub fn runs(folder: &Path) -> Vec<PathBuf> {
         files::POLICY,
         files::METRICS,
     ];
-    let holds = |path: &PathBuf| own.iter().any(|file| path.join(file).exists());
+    let is_closed = |path: &Path| {
+        let looked = fs::metadata(path.join(files::CONFIG));
+        looked.is_err_and(|e| e.kind() == io::ErrorKind::PermissionDenied)
+    };
+    let holds = |path: &PathBuf| {
+        let has_own = own.iter().any(|file| path.join(file).exists());
+        has_own || is_closed(path) || Lock::holder(path).is_some()
+    };
     let mut found: Vec<PathBuf> = entries(folder).filter(holds).collect();
     found.sort();
     found
@@ -294,7 +327,9 @@ pub fn meant_preset(
     names: impl IntoIterator<Item = &'static str>,
 ) -> Option<String> {
     let files = beside(wanted).filter(|path| has_extension(path, "json") || is_run(path));
-    let runs = runs(Path::new(RUNS)).into_iter();
+    let runs = runs(Path::new(RUNS))
+        .into_iter()
+        .filter(|path| is_run(path));
     let runs = runs.filter_map(|path| path.file_name().map(PathBuf::from));
     let names = names.into_iter().map(PathBuf::from);
     meant(wanted, names.chain(runs).chain(files))

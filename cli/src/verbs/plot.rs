@@ -1,18 +1,22 @@
 //! `mimic plot`: draws the learning curves of runs.
 
+mod log;
+
 use crate::amount;
 use crate::args::Replace;
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::locate;
 use crate::output::{self, Form, Maker, Output};
 use crate::plot::curves::{self, Curve, Panel, Scale};
 use crate::printer::Printer;
+use log::{Columns, columns};
 use mimic::explain::plain;
 use mimic::file::Lock;
-use mimic::file::text_at_most;
-use mimic::run::{Checkpoint, files};
-use serde_json::{Map, Value, json};
-use std::io::ErrorKind::NotFound;
+use mimic::run::{Checkpoint, Run, Scores, files};
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -27,10 +31,6 @@ the end.";
 
 /// By default a curve is averaged over the run's length divided by this. Chosen: noise fades, and rises stay visible.
 const SMOOTH_POINTS: usize = 50;
-
-/// Most bytes that are read of a run's log or evaluation. Chosen: a line of a log has about five hundred, and no run has a
-/// million iterations.
-const MOST_BYTES: u64 = 1 << 30;
 
 /// The panels: field of metrics.jsonl, heading, scale.
 const FIGURES: [(&str, &str, Scale); 10] = [
@@ -53,6 +53,9 @@ const FIGURES: [(&str, &str, Scale); 10] = [
     ),
     ("samples_per_second", "samples per second", Scale::Linear),
 ];
+
+/// The number of one of them.
+const NORMALIZED_RETURN: usize = 1;
 
 /// The panels from eval.json: field, heading.
 const EVALUATED: [(&str, &str); 2] = [
@@ -81,8 +84,8 @@ pub struct Args {
 struct Log {
     name: String,
     folder: PathBuf,
-    lines: Vec<Map<String, Value>>,
-    evaluation: Option<Value>,
+    columns: Columns,
+    scores: Option<Scores>,
     /// Samples of the checkpoint from which the run goes on, if it was stopped after that.
     saved: Option<u64>,
 }
@@ -121,88 +124,46 @@ impl Args {
 impl Log {
     fn read(folder: &Path) -> Outcome<Self> {
         let path = folder.join(files::METRICS);
-        let text = text_at_most(&path, MOST_BYTES).map_err(|e| {
-            let failure = Failure::unreadable(&path, &e);
-            match e.kind() {
-                NotFound => failure.with_remedy("train the run first"),
-                _ => failure,
-            }
-        })?;
-        let mut lines = Vec::new();
-        // The last line has no end while it is being written.
-        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-        for (number, line) in whole.lines().enumerate() {
-            let line = serde_json::from_str(line).map_err(|e| {
-                // The reader counts lines too, from the start of this one.
-                let e = e.to_string();
-                let cause = e.split(" at line ").next().unwrap_or(&e);
-                Failure::input(&path, format!("this is not an iteration ({cause})"))
-                    .with_place(format!("line {}", number + 1))
-                    .with_remedy("remove the line")
-            })?;
-            lines.push(line);
-        }
-        if lines.is_empty() {
-            return Err(
-                Failure::input(&path, "it holds no iteration yet").with_remedy("train longer")
-            );
-        }
+        let columns = columns(&path)?;
         let name = folder.file_name().unwrap_or(folder.as_os_str());
         Ok(Self {
             name: name.to_string_lossy().into_owned(),
-            evaluation: evaluation(&folder.join(files::EVALUATION))?,
+            scores: Run::scores(folder)?,
             folder: folder.to_owned(),
-            saved: saved(folder, &lines),
-            lines,
+            saved: saved(folder, &columns),
+            columns,
         })
     }
 
     fn samples(&self) -> f64 {
-        let last = self.lines.last().and_then(|line| line.get("samples"));
-        last.and_then(Value::as_f64).unwrap_or(0.0)
+        let last = self.columns.values(&self.columns.samples).last();
+        last.filter(|samples| samples.is_finite()).unwrap_or(0.0)
     }
 
-    /// (samples, value) of every iteration that has this field.
-    fn points(&self, field: &str) -> Vec<(f64, f64)> {
-        let number = |line: &Map<String, Value>, field: &str| line.get(field)?.as_f64();
-        let points = self.lines.iter();
+    /// (samples, value) of every iteration that has figure number `figure`.
+    fn points(&self, figure: usize) -> Vec<(f64, f64)> {
+        let columns = &self.columns;
+        let points = columns.samples.iter().zip(&columns.figures[figure]);
+        let points = points.map(|(x, y)| (*x, *y));
         points
-            .filter_map(|line| Some((number(line, "samples")?, number(line, field)?)))
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
             .collect()
     }
 
-    /// A field of the evaluation, averaged over the run's motions.
-    fn evaluated(&self, field: &str) -> Option<f64> {
-        let evaluation = self.evaluation.as_ref()?;
-        let Some(motions) = evaluation["motions"].as_array() else {
-            return evaluation[field].as_f64();
-        };
-        let values: Option<Vec<f64>> = motions.iter().map(|m| m[field].as_f64()).collect();
-        let values = values.filter(|values| !values.is_empty())?;
-        Some(values.iter().sum::<f64>() / values.len() as f64)
+    /// Number `figure` of [`EVALUATED`].
+    fn evaluated(&self, figure: usize) -> Option<f64> {
+        let scores = self.scores?;
+        [Some(scores.survival), scores.mpjpe_local_mm][figure]
     }
 }
 
 /// Samples of the checkpoint, if the log goes on after it and nobody trains the run.
-fn saved(folder: &Path, lines: &[Map<String, Value>]) -> Option<u64> {
-    let logged = lines.last()?.get("samples")?.as_u64()?;
+fn saved(folder: &Path, log: &Columns) -> Option<u64> {
+    let logged = log.values(&log.samples).last()?;
     let saved = Checkpoint::load(folder.join(files::CHECKPOINT))
         .ok()?
         .samples;
-    (saved < logged && Lock::holder(folder).is_none()).then_some(saved)
-}
-
-/// The evaluation of a run; an unfinished one has none.
-fn evaluation(path: &Path) -> Outcome<Option<Value>> {
-    if !path.exists() {
-        return Ok(None);
-    }
-    let text = text_at_most(path, MOST_BYTES).map_err(|e| Failure::unreadable(path, &e))?;
-    let value = serde_json::from_str(&text).map_err(|e| {
-        Failure::input(path, format!("this is not an evaluation ({e})"))
-            .with_remedy("write it again with `mimic eval`")
-    })?;
-    Ok(Some(value))
+    ((saved as f64) < logged && Lock::holder(folder).is_none()).then_some(saved)
 }
 
 /// Names for the legend; runs of the same name go by their folders.
@@ -218,21 +179,23 @@ fn distinct(logs: &[Log]) -> Vec<String> {
 
 /// The panels for which at least one run has numbers.
 fn panels(logs: &[Log], smooth: Option<usize>) -> Vec<Panel> {
-    let learned = FIGURES.iter().map(|(field, heading, scale)| Panel {
+    let learned = FIGURES.iter().enumerate();
+    let learned = learned.map(|(figure, (_, heading, scale))| Panel {
         heading,
         scale: *scale,
         curves: logs
             .iter()
-            .map(|log| curve(log.points(field), smooth))
+            .map(|log| curve(log.points(figure), smooth))
             .collect(),
     });
-    let evaluated = EVALUATED.iter().map(|(field, heading)| Panel {
+    let evaluated = EVALUATED.iter().enumerate();
+    let evaluated = evaluated.map(|(figure, (_, heading))| Panel {
         heading,
         scale: Scale::Linear,
         curves: logs
             .iter()
             .map(|log| {
-                let dot = log.evaluated(field).map(|value| (log.samples(), value));
+                let dot = log.evaluated(figure).map(|value| (log.samples(), value));
                 curve(dot.into_iter().collect(), Some(1))
             })
             .collect(),
@@ -273,28 +236,65 @@ fn iterations(count: usize) -> String {
     }
 }
 
-fn report(path: &Path, names: &[String], logs: &[Log]) -> Value {
-    let run = |(name, log): (&String, &Log)| {
-        let column = |field: &str| -> Vec<Value> {
-            let value = |line: &Map<String, Value>| line.get(field).cloned().unwrap_or_default();
-            log.lines.iter().map(value).collect()
-        };
-        let mut run = json!({ "run": log.folder.display().to_string(), "name": name, "samples": column("samples") });
-        for (field, ..) in FIGURES {
-            run[field] = column(field).into();
+/// The numbers for scripts, written as they are serialized.
+#[derive(Serialize)]
+struct Report<'a> {
+    plot: String,
+    runs: Vec<RunReport<'a>>,
+}
+
+struct RunReport<'a> {
+    name: &'a str,
+    log: &'a Log,
+}
+
+struct Column<'a>(&'a Columns, &'a [f64]);
+
+fn report<'a>(path: &Path, names: &'a [String], logs: &'a [Log]) -> Report<'a> {
+    let runs = names.iter().zip(logs);
+    Report {
+        plot: path.display().to_string(),
+        runs: runs.map(|(name, log)| RunReport { name, log }).collect(),
+    }
+}
+
+impl Serialize for RunReport<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Log {
+            folder, columns, ..
+        } = self.log;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("run", &folder.display().to_string())?;
+        map.serialize_entry("name", self.name)?;
+        map.serialize_entry("samples", &Column(columns, &columns.samples))?;
+        for ((field, ..), figure) in FIGURES.iter().zip(&columns.figures) {
+            map.serialize_entry(field, &Column(columns, figure))?;
         }
-        let evaluated = EVALUATED.map(|(field, _)| (field.to_owned(), json!(log.evaluated(field))));
-        run["evaluation"] = Value::Object(Map::from_iter(evaluated));
-        run
-    };
-    let runs: Vec<Value> = names.iter().zip(logs).map(run).collect();
-    json!({ "plot": path.display().to_string(), "runs": runs })
+        let evaluated = EVALUATED.iter().enumerate();
+        let evaluated = evaluated.map(|(n, (field, _))| (*field, self.log.evaluated(n)));
+        map.serialize_entry("evaluation", &BTreeMap::from_iter(evaluated))?;
+        map.end()
+    }
+}
+
+impl Serialize for Column<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.values(self.1).map(number))
+    }
+}
+
+/// A number of the log as it stands there: counts have no decimal point.
+fn number(value: f64) -> Value {
+    match value.fract() == 0.0 && value.abs() < 1e15 {
+        true => json!(value as i64),
+        false => json!(value),
+    }
 }
 
 fn summary(path: &Path, names: &[String], logs: &[Log]) -> String {
     let mut text = format!("{}\n", plain(&path.display().to_string()));
     for (name, log) in names.iter().zip(logs) {
-        let last = log.points("normalized_return").last().map(|(_, y)| *y);
+        let last = log.points(NORMALIZED_RETURN).last().map(|(_, y)| *y);
         let figure = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
@@ -304,11 +304,11 @@ fn summary(path: &Path, names: &[String], logs: &[Log]) -> String {
         text += &format!(
             "  {}: {}, {:.2} M samples{saved}, normalised return {}, survival {}, local error {} mm\n",
             plain(name),
-            iterations(log.lines.len()),
+            iterations(log.columns.iterations),
             log.samples() / 1e6,
             figure(last, 3),
-            figure(log.evaluated("survival"), 3),
-            figure(log.evaluated("mpjpe_local_mm"), 1),
+            figure(log.evaluated(0), 3),
+            figure(log.evaluated(1), 1),
         );
     }
     text

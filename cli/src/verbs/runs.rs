@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
 use mimic::explain::plain;
-use mimic::file::{Lock, text_at_most};
+use mimic::file::Lock;
 use mimic::run::{Checkpoint, Run, files};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ Examples:
   mimic runs experiments                     list those in another folder
   mimic runs --json                          print JSON for scripts
 
-A run is `training` while a process writes it, `finished` once it has learned from all its samples \
+A run is `preparing` while a process makes its motions, `training` while a process writes it, `finished` once it has learned from all its samples \
 and was measured, `stopped` before that (`mimic train --resume RUN` goes on), and `broken` if its \
 files cannot be read. Survival is that of its last evaluation, averaged over its clips. Samples are those from which \
 `--resume` goes on, and at most the planned number: a run learns in whole iterations, so it may have \
@@ -40,6 +40,8 @@ pub struct Args {
 #[derive(Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum State {
+    /// Nothing is learned yet: its motions are made.
+    Preparing,
     Training,
     Stopped,
     Finished,
@@ -84,7 +86,11 @@ impl Args {
 /// The folders to list. The folder of all runs appears with the first of them.
 fn folders(wanted: Option<&Path>) -> Outcome<Vec<PathBuf>> {
     let Some(folder) = wanted else {
-        return Ok(locate::runs(Path::new(locate::RUNS)));
+        let folder = Path::new(locate::RUNS);
+        return match std::fs::read_dir(folder) {
+            Err(cause) if cause.kind() != NotFound => Err(Failure::unreadable(folder, &cause)),
+            _ => Ok(locate::runs(folder)),
+        };
     };
     if let Some(run) = locate::existing_run(folder) {
         return Ok(vec![run]);
@@ -113,6 +119,11 @@ fn entry(run: &Path) -> Entry {
         error: None,
         learned,
     };
+    let is_made = run.join(files::CONFIG).try_exists().unwrap_or(true);
+    if bare.held_by.is_some() && !is_made {
+        let state = State::Preparing;
+        return Entry { state, ..bare };
+    }
     match read(run, bare.held_by.is_some()) {
         Ok(found) => Entry {
             run: bare.run,
@@ -130,6 +141,10 @@ fn entry(run: &Path) -> Entry {
 
 /// Reads a run. While it is `held`, its log is ahead of its checkpoint.
 fn read(folder: &Path, held: bool) -> Outcome<Entry> {
+    let config = folder.join(files::CONFIG);
+    config
+        .try_exists()
+        .map_err(|e| Failure::unreadable(&config, &e))?;
     if !locate::is_run(folder) {
         let cause = format!("this was a run, and has no {} any more", files::CONFIG);
         return Err(Failure::input(folder, cause).with_remedy("remove the folder"));
@@ -141,10 +156,11 @@ fn read(folder: &Path, held: bool) -> Outcome<Entry> {
         true => Checkpoint::load(saved)?.samples,
         false => 0,
     };
-    let evaluation = evaluation(folder);
+    // One that can't be read counts as none, for a resumed run writes it again.
+    let scores = Run::scores(folder).ok().flatten();
     let (state, samples) = match held {
         true => (State::Training, logged(folder).unwrap_or(saved).max(saved)),
-        false if saved >= plan.samples && evaluation.is_some() => (State::Finished, saved),
+        false if saved >= plan.samples && scores.is_some() => (State::Finished, saved),
         false => (State::Stopped, saved),
     };
     Ok(Entry {
@@ -155,30 +171,11 @@ fn read(folder: &Path, held: bool) -> Outcome<Entry> {
         task: Some(plan.task.name().to_owned()),
         samples: Some(samples),
         planned: Some(plan.samples),
-        survival: evaluation.as_ref().and_then(survival),
+        survival: scores.map(|scores| scores.survival),
         when: None,
         error: None,
         learned: None,
     })
-}
-
-/// Most bytes that are read of an evaluation. Chosen: a thousand motions have a tenth.
-const MOST_BYTES: u64 = 16 << 20;
-
-/// The run's evaluation, if it has one that can be read.
-fn evaluation(run: &Path) -> Option<Value> {
-    let text = text_at_most(run.join(files::EVALUATION), MOST_BYTES).ok()?;
-    serde_json::from_str(&text).ok()
-}
-
-/// Survival over the motions of a run, as `mimic plot` shows it.
-fn survival(evaluation: &Value) -> Option<f64> {
-    let Some(motions) = evaluation["motions"].as_array() else {
-        return evaluation["survival"].as_f64();
-    };
-    let values: Option<Vec<f64>> = motions.iter().map(|m| m["survival"].as_f64()).collect();
-    let values = values.filter(|values| !values.is_empty())?;
-    Some(values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// Samples of the last line of the log. Only its end is read, for logs grow with the training.
@@ -230,8 +227,11 @@ fn row(entry: &Entry) -> [String; 7] {
         format!("{done} of {}", amount::count(planned))
     });
     let ago = entry.learned.map(|time| {
-        let seconds = time.elapsed().unwrap_or_default().as_secs_f64();
-        format!("{} ago", amount::duration(seconds))
+        // A clock that was put back, or of another machine, leaves files of the future.
+        match time.elapsed() {
+            Ok(past) => format!("{} ago", amount::duration(past.as_secs_f64())),
+            Err(ahead) => format!("in {}", amount::duration(ahead.duration().as_secs_f64())),
+        }
     });
     let state = json!(entry.state);
     let state = state.as_str().unwrap_or_default();

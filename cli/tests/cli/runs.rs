@@ -147,3 +147,46 @@ fn a_run_that_is_being_trained_is_listed_with_who_does_it() {
         (&"stopped".into(), &Value::Null)
     );
 }
+
+/// Root may read everything, so there is nothing to test for it.
+#[cfg(unix)]
+#[test]
+fn what_can_not_be_read_is_not_taken_for_nothing() {
+    use std::os::unix::fs::PermissionsExt;
+    let bench = Workbench::with_run();
+    let close = |path: &str, mode| {
+        let mode = std::fs::Permissions::from_mode(mode);
+        std::fs::set_permissions(bench.path(path), mode).expect("it is ours");
+    };
+    close("runs/sway", 0);
+    if std::fs::read_dir(bench.path("runs/sway")).is_ok() {
+        return;
+    }
+    let listed = bench.json(&["runs"]);
+    let message = listed["runs"][0]["error"]["message"].as_str();
+    assert!(
+        message.is_some_and(|m| m.contains("cannot be read")),
+        "{listed}"
+    );
+    let said = bench.complaint(&["eval", "sway"], 2);
+    assert!(said.contains("cannot be read"), "{said}");
+    close("runs", 0);
+    for line in [&["runs"][..], &["eval"], &["eval", "sway"]] {
+        let said = bench.complaint(line, 2);
+        assert!(said.contains("cannot be read"), "{line:?}: {said}");
+    }
+    close("runs", 0o755);
+    close("runs/sway", 0o755);
+}
+
+#[test]
+fn a_clock_that_was_put_back_is_no_puzzle() {
+    let bench = Workbench::with_run();
+    let soon = std::time::SystemTime::now() + std::time::Duration::from_secs(7200);
+    let file = std::fs::File::open(bench.path("runs/sway/checkpoint.safetensors"));
+    file.and_then(|file| file.set_modified(soon))
+        .expect("it is ours");
+    let output = bench.mimic(&["runs"]).assert().success();
+    let text = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+    assert!(text.contains("in ") && !text.contains("ago"), "{text}");
+}

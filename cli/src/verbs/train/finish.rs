@@ -41,7 +41,7 @@ pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome
     run.keep_evaluation(&results)?;
     let recorded = record(run, printer)?;
     if printer.is_json() {
-        return last_line(run, stopped, CaseEvaluation::json(&results), printer);
+        return last_line(run.dir(), stopped, CaseEvaluation::json(&results), printer);
     }
     let folder = plain(&run.dir().display().to_string());
     let look = match recorded {
@@ -56,7 +56,7 @@ pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome
 }
 
 /// Ends a session that was interrupted, and that nothing more is to be said of.
-pub fn interrupted(run: &Run, printer: &Printer) -> Outcome {
+pub fn interrupted(run: &Path, printer: &Printer) -> Outcome {
     match printer.is_json() {
         true => last_line(run, Stopped::Interrupt, Value::Null, printer),
         false => Ok(()),
@@ -64,8 +64,8 @@ pub fn interrupted(run: &Run, printer: &Printer) -> Outcome {
 }
 
 /// The last line of `--json`: which run it was, why it ended, and how good it is, if that was measured.
-fn last_line(run: &Run, stopped: Stopped, eval: Value, printer: &Printer) -> Outcome {
-    printer.json_line(&json!({ "run": run.dir(), "stopped": stopped, "eval": eval }))
+fn last_line(run: &Path, stopped: Stopped, eval: Value, printer: &Printer) -> Outcome {
+    printer.json_line(&json!({ "run": run, "stopped": stopped, "eval": eval }))
 }
 
 /// How a run is evaluated at its end.
@@ -183,7 +183,8 @@ pub fn make_up(session: &Session, printer: &Printer) -> Outcome {
     let folder = shell::path(run.dir());
     let is_there = |name: &str| run.dir().join(name).exists();
     let recorded = !recording::AVAILABLE || is_there(files::RECORDING);
-    if is_there(files::EVALUATION) && recorded && session.has_policy() {
+    let evaluated = matches!(Run::scores(run.dir()), Ok(Some(_)));
+    if evaluated && recorded && session.has_policy() {
         let (samples, mimic) = (session.trainer().samples(), program());
         return Err(Failure::user(format!(
             "the run `{}` is finished: it has learned from all its {samples} samples", run.dir().display()
@@ -209,6 +210,7 @@ fn record(run: &Run, printer: &Printer) -> Outcome<Option<PathBuf>> {
     let start = EpisodeStart::new(0, StartState::Reference(0.0));
     match runs::record(run, start, REPLAY_S) {
         Ok(shown) => {
+            run.check_place()?;
             let file = run.dir().join(files::RECORDING);
             recording::save(&shown, &file)?;
             Ok(Some(file))
@@ -227,7 +229,7 @@ fn how_to_look(folder: &Path, recording: &Path) -> String {
     let mut text = format!(
         "recording: {shown}\n  watch it          rerun {recording}\n  or from the run   {mimic} replay {folder} --rerun\n"
     );
-    if Viewer::find().is_none() {
+    if !Viewer::is_installed() {
         text += &format!("  rerun is not installed yet: {}\n", viewer::install());
     }
     text
