@@ -294,6 +294,192 @@ fn what_a_character_has_is_counted_before_it_is_parsed() {
     }
 }
 
+/// The arm's file with more in it: before its end, before its bodies, in the arm, and in the place of `from`.
+fn after(section: &str) -> String {
+    spoiled("</mujoco>", &format!("{section}</mujoco>"))
+}
+
+fn floor(geom: &str) -> String {
+    spoiled("<worldbody>", &format!("<worldbody>{geom}"))
+}
+
+fn arm(more: &str) -> String {
+    spoiled("<body name=\"arm\"", &format!("<body {more} name=\"arm\""))
+}
+
+fn refused(cases: Vec<(String, &str)>) {
+    for (xml, says) in cases {
+        let said = refusal(&xml);
+        assert!(said.contains(says), "{says}: {said}");
+    }
+}
+
+/// What MuJoCo simulates and we don't isn't passed over: the character would learn under other physics than its file states.
+#[test]
+fn what_is_not_simulated_is_refused_by_its_name() {
+    refused(vec![
+        (
+            after("<equality><weld body1=\"arm\"/></equality>"),
+            "<weld> of <equality>",
+        ),
+        (
+            after("<equality><joint joint1=\"elbow\"/></equality>"),
+            "<joint> of <equality>",
+        ),
+        (
+            after(
+                "<tendon><fixed stiffness=\"5\"><joint joint=\"elbow\" coef=\"1\"/></fixed></tendon>",
+            ),
+            "`stiffness` of a tendon",
+        ),
+        (
+            after("<tendon><spatial damping=\"1\"/></tendon>"),
+            "`damping` of a tendon",
+        ),
+        (
+            after("<default><tendon stiffness=\"2\"/></default>"),
+            "`stiffness` of a tendon",
+        ),
+        (
+            spoiled(
+                "<position name=\"servo\" joint=\"elbow\"",
+                "<position name=\"servo\" tendon=\"elbow\"",
+            ),
+            "an actuator of a `tendon`",
+        ),
+        (
+            floor("<geom type=\"plane\" size=\"1 1 1\" pos=\"0 0 5\"/>"),
+            "z = 0",
+        ),
+        (
+            floor("<geom type=\"plane\" size=\"1 1 1\" pos=\"0 0 -0.1\"/>"),
+            "z = 0",
+        ),
+        (
+            floor("<geom type=\"plane\" size=\"1 1 1\" euler=\"0.1 0 0\"/>"),
+            "z = 0",
+        ),
+        (
+            floor("<geom type=\"plane\" size=\"1 1 1\" zaxis=\"1 0 0\"/>"),
+            "z = 0",
+        ),
+        (
+            floor("<body pos=\"0 0 1\"><geom type=\"plane\" size=\"1 1 1\"/></body>"),
+            "z = 0",
+        ),
+        (
+            spoiled(
+                "<inertial",
+                "<geom type=\"plane\" size=\"1 1 1\"/><inertial",
+            ),
+            "a plane that moves",
+        ),
+    ]);
+}
+
+#[test]
+fn elements_that_mujoco_would_not_read_so_are_refused() {
+    refused(vec![
+        (floor("<body mocap=\"true\"/>"), "`mocap`"),
+        (arm("gravcomp=\"1\""), "`gravcomp`"),
+        (
+            spoiled("size=\"0.04\"", "size=\"0.04\" condim=\"0\""),
+            "`condim` of 0",
+        ),
+        (
+            spoiled("size=\"0.04\"", "size=\"0.04\" condim=\"7\""),
+            "`condim` of 7",
+        ),
+        (
+            after("<default><geom condim=\"2\"/></default>"),
+            "`condim` of 2",
+        ),
+        (
+            spoiled("size=\"0.04\"", "size=\"0.04 0 0 0 0 0\""),
+            "`size` has 6 numbers",
+        ),
+        (
+            spoiled("pos=\"0 0.3 0\"", "pos=\"0 0.3\""),
+            "`pos` has 2 numbers",
+        ),
+        (
+            spoiled("forcerange=\"-50 50\"", "forcerange=\"-50 50 9\""),
+            "`forcerange` has 3 numbers",
+        ),
+        (
+            spoiled("quat=\"1 0 0 0\"", "quat=\"1 0 0 0\" euler=\"0 0 1\""),
+            "`quat` and `euler`",
+        ),
+        (
+            spoiled("quat=\"1 0 0 0\"", "axisangle=\"1 0 0 0\" zaxis=\"0 0 1\""),
+            "`axisangle` and `zaxis`",
+        ),
+        (
+            spoiled("forcerange=\"-50 50\"", "forcerange=\"-200 -1\""),
+            "doesn't hold 0",
+        ),
+    ]);
+}
+
+/// What changes nothing is let through, and what takes a little freedom away is told.
+#[test]
+fn what_is_harmless_is_no_reason_to_refuse_a_character() {
+    for (xml, told) in [
+        (after("<equality/>"), None),
+        (arm("gravcomp=\"0\" mocap=\"false\""), None),
+        (
+            floor("<geom type=\"plane\" size=\"0 0 1\" condim=\"3\"/>"),
+            None,
+        ),
+        (
+            floor(
+                "<geom type=\"plane\" size=\"1 1 1\" pos=\"0 0 5\" contype=\"0\" conaffinity=\"0\"/>",
+            ),
+            None,
+        ),
+        (
+            floor(
+                "<body pos=\"0 0 1\"><geom type=\"plane\" size=\"1 1 1\" pos=\"0 0 -1\"/></body>",
+            ),
+            None,
+        ),
+        (
+            after(
+                "<tendon><fixed name=\"ham\" range=\"-1 2\"><joint joint=\"elbow\" coef=\"1\"/></fixed></tendon>",
+            ),
+            Some("tendon `ham`"),
+        ),
+    ] {
+        let found = load(&xml).map(|skeleton| skeleton.left_out().join(" "));
+        let found = found.unwrap_or_else(|e| panic!("{e}: {xml}"));
+        match told {
+            Some(told) => assert!(found.contains(told), "{found}"),
+            None => assert_eq!(found, ""),
+        }
+    }
+}
+
+/// A file of slots that is named, but can't be read, isn't as good as none.
+#[cfg(unix)]
+#[test]
+fn slots_that_lead_nowhere_are_no_missing_slots() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mjcf, beside) = (
+        folder.path().join("arm.xml"),
+        folder.path().join("arm.json"),
+    );
+    std::fs::write(&mjcf, ARM).expect("it is written");
+    for target in ["nowhere.json", "arm.json"] {
+        std::os::unix::fs::symlink(target, &beside).expect("a link");
+        let told = Skeleton::load(&mjcf)
+            .expect_err("it leads nowhere")
+            .explain();
+        assert_eq!(told.file.as_deref(), Some(beside.as_path()), "{told:?}");
+        std::fs::remove_file(&beside).expect("removed");
+    }
+    assert!(Skeleton::load(&mjcf).is_ok());
+}
+
 /// The examples of others.
 #[test]
 fn known_contradictions_are_refused() {

@@ -113,7 +113,9 @@ impl Preparation {
         let done = done.map_err(|e| Failure::in_file(&self.file, e))?;
         let new = |problem: &&Problem| !clip.problems.contains(problem);
         let found = done.report.problems.iter().filter(new).cloned();
-        let problems = clip.problems.iter().cloned().chain(found).collect();
+        let left_out = left_out(&skeleton);
+        let problems = clip.problems.iter().cloned().chain(found);
+        let problems = problems.chain(left_out).collect();
         let (mut motion, seconds) = (done.motion, Some(done.seconds));
         motion.name = self.name();
         Ok(Prepared {
@@ -144,9 +146,9 @@ impl Preparation {
         printer.detail(format!("read `{}`", self.file.display()));
         Ok(Prepared {
             motion,
+            problems: left_out(&skeleton),
             skeleton,
             seconds: None,
-            problems: Vec::new(),
         })
     }
 
@@ -191,4 +193,13 @@ impl Preparation {
             HumanoidMap::from_json(&text, &clip.joints).map_err(|e| Failure::in_file(path, e))?;
         Ok(Some(map))
     }
+}
+
+/// What of a character isn't simulated.
+fn left_out(skeleton: &Skeleton) -> Vec<Problem> {
+    let warning = |text: String| {
+        let text = format!("character `{}`: {text}", skeleton.name);
+        Problem::warning("not-simulated", text)
+    };
+    skeleton.left_out().into_iter().map(warning).collect()
 }

@@ -52,5 +52,12 @@ fn check_one(actuator: &Actuator, joints: &BTreeSet<&str>) -> Result<(), Defect>
             return Err(Defect::new(cause, "write the lower end first"));
         }
     }
+    // A drive here pulls both ways.
+    if let Some([low, high]) = actuator.force_range
+        && !(low <= 0.0 && high >= 0.0)
+    {
+        let cause = format!("its `forcerange` {low} to {high} doesn't hold 0");
+        return Err(Defect::new(cause, "write a range from below 0 to above 0"));
+    }
     Ok(())
 }

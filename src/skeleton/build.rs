@@ -5,9 +5,9 @@ use super::inertia::{MassProperties, set_total_mass};
 use super::shape::{Solid, isometry};
 use super::{Body, Joint, JointKind, actuators, drive};
 use mjcf_rs::Model;
-use mjcf_rs::body::{Body as MjcfBody, GeomType, Joint as MjcfJoint, JointType};
+use mjcf_rs::body::{Body as MjcfBody, Geom, GeomType, Joint as MjcfJoint, JointType};
 use mjcf_rs::compiler::InertiaFromGeom;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 /// Lengths and distances that are let through, metres. Chosen: no character is a kilometre tall.
 pub(super) const MOST_LENGTH: f64 = 1000.0;
@@ -21,6 +21,9 @@ const LEAST_INERTIA: f64 = 1e-15;
 const MOST_OF_BODY: usize = 6;
 /// Most degrees of freedom of a character. Chosen, as for the joints in the text (see [`super::guard`]).
 const MOST_FREEDOMS: usize = 256;
+
+/// How far the ground may be from where it is simulated, metres, and how far its normal from the vertical. Chosen: rounding.
+const LEVEL: f64 = 1e-6;
 
 /// What to do about numbers such as `nan` and `1e999`.
 const FINITE: &str = "write finite numbers of at most 1000 m";
@@ -105,7 +108,18 @@ impl<'a> Builder<'a> {
 
     fn add_bodies(&mut self) -> Result<(), SkeletonError> {
         let model = self.model;
+        // Where the scenery is: bodies without a joint above them. The first is the world.
+        let mut placed = vec![None; model.bodies.len()];
+        if let Some(world) = model.bodies.first() {
+            placed[0] = Some(Isometry3::identity());
+            self.check_planes(&world.body, placed[0])?;
+        }
         for (id, entry) in model.bodies_iter() {
+            let above = entry.parent.and_then(|parent| placed[parent]);
+            placed[id] = above
+                .filter(|_| entry.body.joints.is_empty())
+                .map(|above| above * isometry(&entry.body.pose));
+            self.check_planes(&entry.body, placed[id])?;
             let parent = entry.parent.and_then(|p| self.index.get(p).copied());
             let parent = parent.flatten();
             let joints = &entry.body.joints;
@@ -128,6 +142,35 @@ impl<'a> Builder<'a> {
                 "add <freejoint/> to the character's top body",
             );
             return Err(self.error("<worldbody>", defect));
+        }
+        Ok(())
+    }
+
+    /// Checks the planes of a body: the ground is the level one at height 0, and there is no other. `place` is that of a body that
+    /// doesn't move.
+    fn check_planes(
+        &self,
+        body: &MjcfBody,
+        place: Option<Isometry3<f64>>,
+    ) -> Result<(), SkeletonError> {
+        let is_plane = |geom: &&Geom| geom.type_ == GeomType::Plane;
+        let touches = |geom: &&Geom| geom.contype != 0 || geom.conaffinity != 0;
+        for geom in body.geoms.iter().filter(is_plane).filter(touches) {
+            let at = place.map(|place| place * isometry(&geom.pose));
+            let is_ground = |at: Isometry3<f64>| {
+                let up = at.rotation * Vector3::z();
+                at.translation.z.abs() <= LEVEL && up.z >= 1.0 - LEVEL
+            };
+            let cause = match at {
+                None => "a plane that moves is not simulated",
+                Some(at) if !is_ground(at) => {
+                    "the ground is simulated as the level plane at z = 0, and this one is another"
+                }
+                Some(_) => continue,
+            };
+            let name = geom.name.as_deref().unwrap_or("without a name");
+            let defect = Defect::new(cause, "put the plane there, or remove it");
+            return Err(self.error(format!("geom `{name}`"), defect));
         }
         Ok(())
     }

@@ -61,11 +61,20 @@ impl Skeleton {
         }
         let xml = read(path)?;
         let beside = path.with_extension("json");
-        let json = beside.exists().then(|| read(&beside)).transpose()?;
+        // A link that leads nowhere is there: who made it wanted it read.
+        let is_there = beside.symlink_metadata().is_ok();
+        let json = is_there.then(|| read(&beside)).transpose()?;
         let name = path.file_stem().unwrap_or(path.as_os_str());
         Self::from_mjcf(&name.to_string_lossy(), &xml, json.as_deref())
             .and_then(Self::with_motors)
             .map_err(|error| error.in_files(path, &beside))
+    }
+
+    /// What the character's file states, is not simulated, and takes no more than a little freedom away; in words, one sentence each.
+    pub fn left_out(&self) -> Vec<String> {
+        let tendons = guard::limited_tendons(&self.mjcf).into_iter();
+        let told = |name| format!("the limits of tendon `{name}` are not simulated");
+        tendons.map(told).collect()
     }
 
     /// Makes a character of MJCF text, with the masses, frames and joints that MuJoCo would compile.

@@ -3,9 +3,11 @@
 
 mod markup;
 mod numbers;
+mod unsimulated;
 
 use super::error::{Defect, SkeletonError};
 use markup::{Markup, Tag, markup};
+pub(super) use unsimulated::limited_tendons;
 
 /// Most bytes of a text. Chosen: the largest humanoids of MuJoCo Menagerie have fifty thousand, and the parser takes a
 /// multiple of that in memory and time.
@@ -144,6 +146,7 @@ impl<'a> Guard<'a> {
             ));
         }
         check_tag(tag, classes > 0)?;
+        unsimulated::check(tag, self.open.last().map_or("", |open| open.name))?;
         if !tag.is_empty {
             self.open.push(tag);
         }
