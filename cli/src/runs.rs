@@ -1,6 +1,6 @@
 //! Training runs: opening, evaluating and recording them, for the verbs that do.
 
-use crate::args::positive;
+use crate::args::{MOST_THREADS, positive};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
 use crate::printer::Printer;
@@ -162,10 +162,26 @@ pub fn at_most(text: &str, most: f64, unit: &str) -> Result<f64, String> {
 
 /// Uses this many threads for everything from now on. Results do not depend on it.
 pub fn use_threads(threads: Option<usize>) -> Outcome<usize> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0));
+    let threads = threads.unwrap_or_else(|| asked_threads().min(MOST_THREADS));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
     pool.build_global()
         .map_err(|e| Failure::work(format!("cannot start threads: {e}")))?;
     Ok(rayon::current_num_threads())
+}
+
+/// Bounds the threads of commands that have no flag for them.
+pub fn bound_threads() -> Outcome {
+    match asked_threads() > MOST_THREADS {
+        true => use_threads(None).map(|_| ()),
+        false => Ok(()),
+    }
+}
+
+/// Threads that the environment asks for; 0 for as many as there are cores. The variables are those of `rayon`.
+fn asked_threads() -> usize {
+    let variables = ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"];
+    let mut asked = variables.iter().filter_map(|name| std::env::var(name).ok());
+    asked.find_map(|text| text.parse().ok()).unwrap_or(0)
 }
 
 #[cfg(test)]

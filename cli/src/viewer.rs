@@ -5,6 +5,7 @@ mod place;
 pub use place::Bind;
 
 use crate::failure::{Failure, Outcome};
+use crate::signals;
 use place::answers;
 use std::fmt::Display;
 use std::io::Read;
@@ -29,6 +30,10 @@ const PAUSE: Duration = Duration::from_millis(100);
 /// How long a viewer may take to start. Chosen: a first start on a busy machine takes several seconds.
 const START: Duration = Duration::from_secs(15);
 
+/// How long a viewer that is asked to end may take. Chosen: whoever pressed Ctrl-C waits for it.
+#[cfg(unix)]
+const FAREWELL: Duration = Duration::from_secs(2);
+
 /// An installed viewer.
 pub struct Viewer {
     path: PathBuf,
@@ -39,12 +44,14 @@ pub struct Viewer {
 impl Viewer {
     /// The `rerun` program on the search path.
     pub fn find() -> Option<Self> {
-        let program = format!("rerun{}", std::env::consts::EXE_SUFFIX);
-        let path = std::env::split_paths(&std::env::var_os("PATH")?)
-            .map(|folder| folder.join(&program))
-            .find(|path| path.is_file())?;
+        let path = installed()?;
         let version = stated_version(&path);
         Some(Self { path, version })
+    }
+
+    /// Whether there is such a program.
+    pub fn is_installed() -> bool {
+        installed().is_some()
     }
 
     /// The viewer, or a failure that says how to get one.
@@ -80,7 +87,8 @@ impl Viewer {
                 .args(["--expect-data-soon", "--hide-welcome-screen"]);
             let mut viewer = self.start(window)?;
             // The program that was started may be a launcher, which ends well before the window.
-            self.await_answers(&[place], &mut viewer, |status| !status.success())?;
+            let never = AtomicBool::new(false);
+            self.await_answers(&[place], &mut viewer, |status| !status.success(), &never)?;
             return Ok(address(&place::reachable(place).to_string()));
         }
         Ok(address(&place::reachable(place).to_string()))
@@ -96,7 +104,7 @@ impl Viewer {
         let stopped = Arc::new(AtomicBool::new(false));
         let flag = stopped.clone();
         // We stay to end the viewer and to remove the temporary file.
-        ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).ok();
+        signals::on_stop(move || flag.store(true, Ordering::Relaxed))?;
         let page = match bind.port {
             Some(port) => bind.free_port(port)?,
             None => bind.free_port(PAGE)?,
@@ -117,10 +125,12 @@ impl Viewer {
         }
         let mut viewer = self.start(command)?;
         let places = [bind.place(page), bind.place(data)];
-        let served = self
-            .await_answers(&places, &mut viewer, |_| true)
-            .and_then(|()| ready(&bind.page_address(page, data)))
-            .and_then(|()| self.outlast(&mut viewer, &stopped).map_err(Failure::partly));
+        let served = self.await_answers(&places, &mut viewer, |_| true, &stopped);
+        let served = served.and_then(|answers| match answers {
+            true => ready(&bind.page_address(page, data))
+                .and_then(|()| self.outlast(&mut viewer, &stopped).map_err(Failure::partly)),
+            false => Ok(()),
+        });
         end(&mut viewer);
         served
     }
@@ -136,8 +146,7 @@ impl Viewer {
             .stderr(Stdio::null());
         // In a process group of its own: a Ctrl-C for this program leaves its window open, and what is served ends as a
         // whole, although the program that was started may be a launcher.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        on_its_own(&mut command);
         command
     }
 
@@ -145,17 +154,22 @@ impl Viewer {
         command.spawn().map_err(|e| self.broken(e))
     }
 
-    /// Waits until the viewer listens everywhere, or ends in a way that `fails`.
+    /// Waits until the viewer listens everywhere, or ends in a way that `fails`, or until this program is asked to end. Returns
+    /// whether it listens.
     fn await_answers(
         &self,
         places: &[SocketAddr],
         viewer: &mut Child,
         fails: impl Fn(ExitStatus) -> bool,
-    ) -> Outcome {
+        stopped: &AtomicBool,
+    ) -> Outcome<bool> {
         let begun = Instant::now();
         while begun.elapsed() < START {
+            if stopped.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
             if places.iter().all(|place| answers(place::reachable(*place))) {
-                return Ok(());
+                return Ok(true);
             }
             let ended = viewer.try_wait().map_err(|e| self.broken(e))?;
             if let Some(status) = ended.filter(|status| fails(*status)) {
@@ -195,28 +209,77 @@ impl Viewer {
     }
 }
 
+/// Where the viewer is installed.
+fn installed() -> Option<PathBuf> {
+    let program = format!("rerun{}", std::env::consts::EXE_SUFFIX);
+    std::env::split_paths(&std::env::var_os("PATH")?)
+        .map(|folder| folder.join(&program))
+        .find(|path| path.is_file())
+}
+
+/// Starts a program in a process group of its own.
+fn on_its_own(command: &mut Command) {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    #[cfg(not(unix))]
+    let _ = command;
+}
+
 /// Ends a viewer and all that it started.
+#[cfg(unix)]
+fn end(viewer: &mut Child) {
+    signal(viewer, libc::SIGTERM);
+    if !has_ended_within(viewer, FAREWELL) {
+        end_at_once(viewer);
+    }
+}
+
+/// The same without asking.
+#[cfg(unix)]
+fn end_at_once(program: &mut Child) {
+    signal(program, libc::SIGKILL);
+    program.wait().ok();
+}
+
+/// Sends a signal to a program in a process group of its own, and to all that it started.
 #[cfg(unix)]
 #[allow(
     unsafe_code,
     reason = "no safe interface sends a signal to a process group"
 )]
-fn end(viewer: &mut Child) {
-    if let Ok(group) = i32::try_from(viewer.id()) {
+fn signal(program: &Child, signal: libc::c_int) {
+    if let Ok(group) = i32::try_from(program.id()) {
         // SAFETY: sending a signal touches no memory of ours. The group has the number of its first process, which we
         // started and which has that number at least until it is waited for; later none of that number is left, or it is
         // the rest of the group.
         unsafe {
-            libc::kill(-group, libc::SIGTERM);
+            libc::kill(-group, signal);
         }
     }
-    viewer.wait().ok();
+}
+
+/// Waits until a program ends, or for so long.
+#[cfg(unix)]
+fn has_ended_within(program: &mut Child, patience: Duration) -> bool {
+    let begun = Instant::now();
+    while !matches!(program.try_wait(), Ok(Some(_))) {
+        if begun.elapsed() > patience {
+            return false;
+        }
+        std::thread::sleep(PAUSE / 4);
+    }
+    true
 }
 
 #[cfg(not(unix))]
 fn end(viewer: &mut Child) {
-    viewer.kill().ok();
-    viewer.wait().ok();
+    end_at_once(viewer);
+}
+
+#[cfg(not(unix))]
+fn end_at_once(program: &mut Child) {
+    program.kill().ok();
+    program.wait().ok();
 }
 
 /// Address of a viewer that listens at `host:port`. A whole address stays as it is.
@@ -254,8 +317,9 @@ pub fn install() -> String {
     )
 }
 
-/// How long `rerun --version` may take, and most bytes of what it says. Its Python package takes a second or two.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// How long `rerun --version` may take, and most bytes of what it says. Its program answers at once, its Python package takes a
+/// second. Who takes longer has a version that isn't known.
+const PATIENCE: Duration = Duration::from_secs(2);
 const MOST_SAID: u64 = 4096;
 
 /// From the first line of `rerun --version`, e.g. `rerun-cli 0.36.3 (…)`.
@@ -263,14 +327,14 @@ fn stated_version(path: &Path) -> Option<String> {
     let mut program = Command::new(path);
     program.arg("--version").stdin(Stdio::null());
     program.stdout(Stdio::piped()).stderr(Stdio::null());
+    on_its_own(&mut program);
     let mut child = program.spawn().ok()?;
     let said = child.stdout.take()?.take(MOST_SAID);
     // Whatever has this name may say nothing for ever, or talk without end.
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || sender.send(std::io::read_to_string(said).unwrap_or_default()));
     let text = receiver.recv_timeout(PATIENCE).ok();
-    child.kill().ok();
-    child.wait().ok();
+    end_at_once(&mut child);
     let text = text?;
     let mut words = text.split_whitespace();
     words

@@ -41,6 +41,9 @@ pub enum Verb {
 
 /// Runs one verb. `command` is the whole command line, for those that describe it.
 pub fn run(verb: Verb, command: Command, library: &Path, printer: &Printer) -> Outcome {
+    if !matches!(verb, Verb::Train(_) | Verb::Eval(_) | Verb::Bench(_)) {
+        crate::runs::bound_threads()?;
+    }
     match verb {
         Verb::Info(args) => args.run(library, printer),
         Verb::Import(args) => args.run(library, printer),

@@ -386,6 +386,57 @@ fn what_is_served_is_for_this_machine_unless_it_is_said_otherwise() {
 }
 
 /// A port that was named is that one or none; one that wasn't is a free one.
+/// A viewer that doesn't end when it is asked to, whether or not it ever listens.
+#[cfg(unix)]
+#[test]
+fn a_stubborn_viewer_ends_with_what_it_serves() {
+    let script = r#"trap '' TERM INT HUP; for a in "$@"; do echo "$a"; done > arguments; while :; do sleep 0.1; done"#;
+    for (listens, name) in [
+        (true, "INT"),
+        (true, "TERM"),
+        (false, "INT"),
+        (false, "HUP"),
+    ] {
+        let bench = with_viewer(script);
+        let mut child = replay(&bench, &["--serve", "--json"])
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        let ports = ["--port=", "--web-viewer-port="].map(|flag| started_with(&bench, flag));
+        let listen = |port: &String| {
+            let place = format!("127.0.0.1:{port}");
+            std::net::TcpListener::bind(place).expect("the port is free")
+        };
+        let listeners = ports.each_ref().map(|port| listens.then(|| listen(port)));
+        if listens {
+            first_line(&mut child);
+        }
+        signal(&child, name);
+        let begun = std::time::Instant::now();
+        let status = child.wait().expect("it ends");
+        assert!(status.success(), "{name}: {status}");
+        assert!(begun.elapsed().as_secs() < 6, "{name}");
+        assert_eq!(names(&bench, "tmp"), Vec::<String>::new());
+        drop(listeners);
+    }
+}
+
+/// Whatever is called `rerun` may say nothing for ever.
+#[cfg(unix)]
+#[test]
+fn a_viewer_that_does_not_say_its_version_is_not_waited_for() {
+    let bench = with_viewer("");
+    bench.write("rerun", b"#!/bin/sh\nsleep 30\n");
+    let path = format!("{}:/usr/bin:/bin", bench.path(".").display());
+    bench.write("tiny.json", crate::workbench::TINY);
+    let trained = ["train", "sway.txt", "--preset", "tiny.json"];
+    for line in [&["doctor"][..], &trained] {
+        let begun = std::time::Instant::now();
+        bench.mimic(line).env("PATH", &path).assert().success();
+        assert!(begun.elapsed().as_secs() < 10, "{line:?}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_port_that_is_taken_is_named() {
