@@ -9,6 +9,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Command, CommandFactory, Parser};
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -67,8 +68,13 @@ pub fn parse() -> Result<Cli, ExitCode> {
         if !error.use_stderr()
             || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
         {
-            // If even this cannot be printed, nobody is left to tell.
-            error.print().ok();
+            let printed = error.print().and_then(|()| std::io::stdout().flush());
+            if let Err(failure) = printed.map_err(|e| Failure::print(&e))
+                && !error.use_stderr()
+            {
+                printer::usage_error(&failure);
+                return failure.code().into();
+            }
             if error.use_stderr() && wants_json() {
                 let failure = Failure::user("there is no command");
                 printer::json_error(&failure.with_remedy("see `mimic --help`"));
@@ -89,7 +95,11 @@ pub fn parse() -> Result<Cli, ExitCode> {
 
 /// Whether errors are JSON. The flags could not be read, so `--json` is looked for by itself.
 fn wants_json() -> bool {
-    std::env::args_os().any(|argument| argument == "--json")
+    let is_json = |argument: &OsString| {
+        let text = argument.to_string_lossy();
+        text == "--json" || text.starts_with("--json=")
+    };
+    std::env::args_os().any(|argument| is_json(&argument))
 }
 
 /// What is wrong with a command line, from what clap says about it: the cause in the first paragraph, then its tips. One of

@@ -249,7 +249,9 @@ pub fn usage_error(failure: &Failure) {
         quiet: false,
         verbose: false,
     };
-    Printer::new(&talk).error(failure.message().unwrap_or_default());
+    if let Some(message) = failure.message() {
+        Printer::new(&talk).error(message);
+    }
 }
 
 /// The error as a JSON object on standard output.

@@ -66,9 +66,11 @@ fn files_of_others_stay_where_a_run_is_refused_or_made() {
         ];
         bench.mimic(&[&line[..], more].concat()).assert().code(code);
     };
-    bench.write("mine/.mimic-notes", b"precious");
-    train(&[], 2);
-    std::fs::rename(bench.path("mine/.mimic-notes"), bench.path("notes")).expect("it stayed");
+    for name in ["mine/.mimic-notes", "mine/.mimic-99999-config"] {
+        bench.write(name, b"precious");
+        train(&[], 2);
+        std::fs::rename(bench.path(name), bench.path("notes")).expect("it stayed");
+    }
     bench.write("mine/.mimic.lock", &lock);
     bench.write("mine/skeleton.xml", b"<mujoco/>");
     train(&["--set", "ppo.gamma=5"], 2);

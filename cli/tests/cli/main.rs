@@ -1,6 +1,7 @@
 //! The `mimic` program as its users meet it.
 
 mod attacked;
+mod bounded;
 mod completions;
 mod disturbed;
 mod edit;
