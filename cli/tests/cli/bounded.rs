@@ -87,7 +87,15 @@ fn rates_and_lengths_are_bounded() {
             .for_each(|frame| frame[0] = seconds.into());
         bench.write("long.txt", long.to_string().as_bytes());
         let line = match verb {
-            "train" => vec![verb, "long.txt", "--fps", "0.5", "--preset", "tiny.json"],
+            "train" => vec![
+                verb,
+                "long.txt",
+                "--fps",
+                "0.5",
+                "--preset",
+                "tiny.json",
+                "--quiet",
+            ],
             _ => vec![verb, "long.txt", "--fps", "0.5"],
         };
         let message = bench.error(&line, 2)["message"].to_string();
