@@ -186,7 +186,7 @@ impl Explain for RunError {
                     .remedy("wait until it ends, or stop it")
             }
             Self::Moved(path) => Explanation::work(
-                "the folder of this run was moved or replaced while it was in use, so nothing more is written here",
+                "the folder of this run was moved or replaced, or its .mimic.lock was removed, so nothing more is written here",
             )
             .file(path)
             .remedy("resume the run where its folder is now; it goes on from its last checkpoint"),

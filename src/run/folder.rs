@@ -6,14 +6,13 @@ use super::controller::Controller;
 use super::error::RunError;
 use super::files;
 use super::plan::Plan;
+use crate::clip::LoopMode;
 use crate::evaluate::{Options, longest};
 use crate::file::{Flaw, Format, Lock, text_at_most};
 use crate::learn::{Policy, PolicySpec, Trainer, TrainerState};
 use crate::motion::Motion;
 use crate::skeleton::Skeleton;
-use crate::task::{
-    Block, Case, CharacterModel, Perturbations, Task, TaskError, TaskSettings, size,
-};
+use crate::task::{Block, CharacterModel, Perturbations, Task, TaskError, TaskSettings, size};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -180,8 +179,8 @@ impl Run {
     /// # Errors
     /// A plan that can't be trained, or a broken checkpoint.
     pub fn trainer(&self) -> Result<Trainer, RunError> {
+        check_lengths(&self.plan, &self.motions)?;
         let task = build(&self.plan.task, &self.skeleton, &self.motions)?;
-        check_lengths(&self.plan, task.as_ref())?;
         let mut trainer = Trainer::new(self.plan.trainer(), task)?;
         let path = self.dir.join(files::CHECKPOINT);
         if path.symlink_metadata().is_err() {
@@ -371,8 +370,8 @@ fn build(
 /// Checks that a plan can be trained: builds everything that training needs except the environments, which take longest.
 pub(super) fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Result<(), RunError> {
     plan.check()?;
+    check_lengths(plan, motions)?;
     let task = build(&plan.task, skeleton, motions)?;
-    check_lengths(plan, task.as_ref())?;
     let spec = PolicySpec {
         observation: size(task.observation()),
         action: size(task.action()),
@@ -383,19 +382,21 @@ pub(super) fn check(plan: &Plan, skeleton: &Skeleton, motions: &[Motion]) -> Res
     Ok(())
 }
 
-/// Checks that what is learned can also be evaluated, by the default options: a run is finished by its evaluation.
-fn check_lengths(plan: &Plan, task: &dyn Task) -> Result<(), RunError> {
+/// Checks that what is learned can also be evaluated, by the default options: a run is finished by its evaluation. Motions that
+/// repeat are evaluated for a while.
+fn check_lengths(plan: &Plan, motions: &[Motion]) -> Result<(), RunError> {
     let perturbations = Some(*plan.task.perturbations()).filter(Perturbations::is_on);
     let options = Options {
         perturbations,
         ..Options::default()
     };
-    let most = longest(options.performed(), task.control_hz());
-    let too_long = |case: &&Case| case.duration_s.is_some_and(|seconds| seconds > most);
-    match task.cases().iter().find(too_long) {
-        Some(case) => Err(RunError::Task(TaskError::TooLong {
-            motion: case.name.clone(),
-            seconds: case.duration_s.unwrap_or_default(),
+    let most = longest(options.performed(), plan.task.physics().control_hz);
+    let ends = |motion: &&Motion| motion.loop_mode == LoopMode::Clamp;
+    let mut ending = motions.iter().filter(ends);
+    match ending.find(|motion| motion.duration() > most) {
+        Some(motion) => Err(RunError::Task(TaskError::TooLong {
+            motion: motion.name.clone(),
+            seconds: motion.duration(),
             most,
         })),
         None => Ok(()),
