@@ -130,6 +130,7 @@ fn mark_of_recording(path: &Path, mark: &Mark) -> Option<String> {
 }
 
 /// What the id of a recording begins with, which is where it says what made it.
+#[cfg(feature = "rerun")]
 pub fn recording_id(mark: &str) -> String {
     format!("{ID}{mark}-")
 }
