@@ -8,8 +8,8 @@ use crate::clip::LoopMode;
 use crate::skeleton::Skeleton;
 use nalgebra::Vector3;
 
-/// Height of a body's lowest point up to which it touches the ground, leg lengths. Chosen: 1 cm with legs of 0.8 m.
-const TOUCHING: f64 = 0.0125;
+/// Height of a body's lowest point up to which it touches the ground, leg lengths. Chosen: 1 cm with legs of 0.87 m.
+const TOUCHING: f64 = 0.0115;
 
 /// What a motion is made from: coordinates and what they don't say themselves.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,8 +111,13 @@ impl Motion {
         };
         let reach = vec![TOUCHING * leg; self.contact_bodies.len()];
         let carries = carried.by(&self.contact_bodies, &reach);
-        for (row, carries) in stands.iter_mut().zip(carries) {
-            row.iter_mut().zip(carries).for_each(|(on, c)| *on |= c);
+        // Whatever was meant to stand or carry, what is above the ground doesn't touch it.
+        for (f, (row, carries)) in stands.iter_mut().zip(carries).enumerate() {
+            for (c, carries) in carries.into_iter().enumerate() {
+                let body = self.contact_bodies[c];
+                let lowest = skeleton.lowest_point_of(&self.bodies[f], &[body]);
+                row[c] = (row[c] || carries) && lowest <= TOUCHING * leg;
+            }
         }
         let support = Support {
             skeleton,

@@ -9,13 +9,14 @@ For every pair:
 - skate: mean horizontal speed of the slowest sole point that is on the ground, while the source's ankle or toes stand
   still there; cm/s
 - penetration: deepest point of any shape below z = 0; cm
+- float: how high the lowest point of a body is that the motion says is in contact; 99th percentile over frames and bodies; cm
 - limits: coordinates more than 1e-6 outside of their range
 - overlap: how deep shapes are in each other at most, those that are apart at rest and whose bodies are neither joined nor
   hang on the same one; mean over frames, and most; cm
 - jumps: the greatest step of a key point from a frame to the next beyond the source's own; cm
 
 Prints a line for each and a summary. Exits 1 when, over all, the median of the key points exceeds CM (3), mean skate
-2 cm/s, mean overlap 0.2 cm, any penetration 1 cm, or any limit is violated. Needs the packages mujoco, numpy and safetensors.
+2 cm/s, mean overlap 0.2 cm, any penetration or float 1 cm, or any limit is violated. Needs the packages mujoco, numpy and safetensors.
 """
 
 import argparse
@@ -215,12 +216,15 @@ def measure(rig, clip, motion):
     scale = leg(ours) / leg(rest)
     qpos, fps = m["qpos"], header["fps"]
     corners = rig.corners()
-    bodies, surfaces, overlaps, depth, outside = [], [], [], 0.0, 0
-    for q in qpos:
+    bodies, surfaces, overlaps, floats, depth, outside = [], [], [], [], 0.0, 0
+    mine = [[i for i, c in enumerate(corners) if rig.model.geom_bodyid[c[0]] == rig.model.body(b).id] for b in moved["contact_bodies"]]
+    for q, contact in zip(qpos, m["contact"]):
         bodies.append(rig.pose(q))
         at = rig.surface(corners)
         surfaces.append(at)
-        depth = max(depth, max(c[2] - p[:, 2].min() for c, p in zip(corners, at)))
+        heights = [p[:, 2].min() - c[2] for c, p in zip(corners, at)]
+        depth = max(depth, -min(heights))
+        floats += [max(min(heights[i] for i in shapes), 0.0) for shapes, on in zip(mine, contact) if on]
         outside += rig.outside(q)
         overlaps.append(max(rig.overlap(), 0.0))
     # A clip of few frames a second becomes a motion of a multiple of them: these are the clip's own.
@@ -255,6 +259,7 @@ def measure(rig, clip, motion):
         "keypoints_cm": np.concatenate(errors) * 100,
         "skate_cm_s": np.array(speeds) * 100,
         "penetration_cm": depth * 100,
+        "float_cm": float(np.percentile(floats, 99)) * 100 if floats else 0.0,
         "outside": outside,
         "overlap_cm": np.array(overlaps) * 100,
         "jump_cm": max((j.max(initial=0.0) for j in jumps), default=0.0) * 100,
@@ -285,7 +290,7 @@ def main():
         keypoints.append(r["keypoints_cm"])
         skates.append(r["skate_cm_s"])
         overlaps.append(r["overlap_cm"])
-        ok &= r["penetration_cm"] <= 1.0 and r["outside"] == 0
+        ok &= r["penetration_cm"] <= 1.0 and r["float_cm"] <= 1.0 and r["outside"] == 0
         row = {
             "motion": pathlib.Path(motion).stem,
             "keypoints_median_cm": float(np.median(r["keypoints_cm"])),
@@ -293,6 +298,7 @@ def main():
             "skate_cm_s": float(r["skate_cm_s"].mean()) if len(r["skate_cm_s"]) else 0.0,
             "still_frames": len(r["skate_cm_s"]),
             "penetration_cm": float(r["penetration_cm"]),
+            "float_cm": r["float_cm"],
             "outside": r["outside"],
             "overlap_mean_cm": float(r["overlap_cm"].mean()),
             "overlap_max_cm": float(r["overlap_cm"].max()),
@@ -308,6 +314,7 @@ def main():
         "keypoints_median_cm": float(np.median(every)),
         "skate_mean_cm_s": float(skate.mean()) if len(skate) else 0.0,
         "penetration_max_cm": max(r["penetration_cm"] for r in rows),
+        "float_max_cm": max(r["float_cm"] for r in rows),
         "outside": sum(r["outside"] for r in rows),
         "overlap_mean_cm": float(np.concatenate(overlaps).mean()),
     }

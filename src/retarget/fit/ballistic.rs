@@ -16,8 +16,8 @@ use nalgebra::{Point3, Vector3};
 /// A flight falls at least half as fast as it should: slower ones are steps with feet that float, or slow motion. So it is
 /// below its parabola by at most this share of the height to which the flight rises …
 const SLOWEST: f64 = 0.5;
-/// … and off it by no more than this in any case, leg lengths. One that is above its parabola is a flight that was drawn too
-/// high, or played too fast. Chosen, as are the others …
+/// … and off it by no more than this in any case, leg lengths. One that is far above its parabola is a flight that was drawn too
+/// high, or played too fast, and is brought down only for a body that is to perform it. Chosen, as are the others …
 const FARTHEST: f64 = 0.35;
 /// … and one that is off by less than this is corrected whatever its height, leg lengths.
 const CLOSE: f64 = 0.04;
@@ -90,7 +90,11 @@ pub(super) fn off_parabola(
     let most = |share: f64| (share * rise).min(FARTHEST * leg).max(CLOSE * leg);
     let farthest = off.iter().map(Vector3::norm).fold(0.0, f64::max);
     let below = off.iter().map(|by| by.z).fold(0.0, f64::max);
-    (farthest <= most(f64::INFINITY) && below <= most(SLOWEST)).then_some(off)
+    let is_flight = match trajectory.to_perform {
+        true => farthest <= most(f64::INFINITY) && below <= most(SLOWEST),
+        false => farthest <= most(SLOWEST),
+    };
+    is_flight.then_some(off)
 }
 
 /// A flight's shifts, and those before and after it that lead to and from their speed.

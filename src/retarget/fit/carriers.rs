@@ -112,7 +112,7 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
     carries
 }
 
-/// Lets the lowest bodies carry where nothing does and the motion needs most of its weight: it hovers, and no flight does. A
+/// Lets the lowest feet carry where nothing does and the motion needs most of its weight: it hovers, and no flight does. A
 /// jump at less than half its speed hovers, too.
 fn put_down(
     fit: &Fit,
@@ -122,10 +122,13 @@ fn put_down(
     carries: &mut [Vec<bool>],
 ) {
     let skeleton = fit.model.skeleton;
+    let feet = [Slot::LeftFoot, Slot::RightFoot].map(|slot| skeleton.slots.get(&slot).copied());
+    let is_foot = |c: &usize| feet.contains(&Some(bodies[*c]));
+    let feet: Vec<usize> = (0..bodies.len()).filter(is_foot).collect();
     let heights = |q: &Vec<f64>| -> Vec<f64> {
         let poses = skeleton.forward(q);
-        let height = |body: &usize| skeleton.lowest_point_of(&poses, &[*body]);
-        bodies.iter().map(height).collect()
+        let height = |c: &usize| skeleton.lowest_point_of(&poses, &[bodies[*c]]);
+        feet.iter().map(height).collect()
     };
     let heights: Vec<Vec<f64>> = frames.iter().map(heights).collect();
     let lowest = |f: usize| heights[f].iter().copied().fold(f64::INFINITY, f64::min);
@@ -141,8 +144,8 @@ fn put_down(
     };
     let hovers = motion::lasting(&hovers, fit.fps, loop_mode);
     for f in (0..frames.len()).filter(|f| hovers[*f]) {
-        for (c, height) in heights[f].iter().enumerate() {
-            carries[f][c] |= *height < lowest(f) + LEVEL;
+        for (c, height) in feet.iter().zip(&heights[f]) {
+            carries[f][*c] |= *height < lowest(f) + LEVEL;
         }
     }
 }
