@@ -28,6 +28,8 @@ const LEVEL: f64 = 0.02;
 /// it is put down, leg lengths. Chosen: clips of games whose hips keep their height hover by 10 cm with bent knees.
 const NEEDS: f64 = 0.75;
 const HOVERS: f64 = 0.2;
+/// Vertical speed of both feet below which it hovers, m/s.
+const PASSES: f64 = 1.0;
 /// Heights that are left alone, metres.
 const STILL: f64 = 0.002;
 
@@ -133,9 +135,17 @@ fn put_down(
     let heights: Vec<Vec<f64>> = frames.iter().map(heights).collect();
     let lowest = |f: usize| heights[f].iter().copied().fold(f64::INFINITY, f64::min);
     let stands = |f: usize| fit.anchors[f].iter().any(Anchor::is_contact);
+    // A foot that takes off or lands passes these heights, and the force of the push is smeared over the frames beside it.
+    let last = frames.len() - 1;
+    let rests = |f: usize| {
+        let (before, after) = (&heights[f.saturating_sub(1)], &heights[(f + 1).min(last)]);
+        let speeds = before.iter().zip(after);
+        let mut speeds = speeds.map(|(a, b)| (b - a).abs() * fit.fps / 2.0);
+        speeds.all(|speed| speed < PASSES)
+    };
     let hovers = |f: usize| {
         let near = lowest(f) < HOVERS * skeleton.leg_length();
-        near && need[f] > NEEDS && !carries[f].contains(&true) && !stands(f)
+        near && rests(f) && need[f] > NEEDS && !carries[f].contains(&true) && !stands(f)
     };
     let hovers: Vec<bool> = (0..frames.len()).map(hovers).collect();
     let loop_mode = match fit.cycle {
@@ -172,11 +182,11 @@ fn drops(
     repeats: bool,
 ) -> Vec<Option<Drop>> {
     let [before, after] = nearest(carries, repeats);
-    let part = |found: Option<(usize, usize)>| {
+    let part = |found: Option<Near>| {
         let hold = |away: usize| smoothstep((1.0 - away as f64 / fade).max(0.0));
         found.map_or((0.0, 0.0), |(away, f)| (hold(away), -lowest(f)))
     };
-    let drop = |(before, after): (Option<(usize, usize)>, Option<(usize, usize)>)| {
+    let drop = |(before, after): (Option<Near>, Option<Near>)| {
         let ((a, before), (b, after)) = (part(before), part(after));
         // Between two that are near, both count in proportion; beside one alone, the rest is no way.
         let by = (before * a + after * b) / (a + b).max(1.0);
@@ -186,13 +196,16 @@ fn drops(
     before.into_iter().zip(after).map(drop).collect()
 }
 
-/// For every frame, how many frames away the nearest flagged one before it and after it is, itself included, and which.
-fn nearest(flags: &[bool], repeats: bool) -> [Vec<Option<(usize, usize)>>; 2] {
+/// A flagged frame: how many frames away it is, and which it is.
+type Near = (usize, usize);
+
+/// For every frame, the nearest flagged one before it and after it, itself included.
+fn nearest(flags: &[bool], repeats: bool) -> [Vec<Option<Near>>; 2] {
     let count = flags.len();
     let rounds = if repeats { 2 } else { 1 };
     // Going through the frames in one direction, and twice through those of a cycle: what precedes the first are the last.
     let since = |at: &dyn Fn(usize) -> usize| {
-        let mut last: Option<(usize, usize)> = None;
+        let mut last: Option<Near> = None;
         let mut found = vec![None; count];
         for step in 0..rounds * count {
             let f = at(step % count);
