@@ -155,6 +155,7 @@ impl<T: Scalar> Learner<T> {
         self.rescale_values(batch.returns);
         self.prepare(batch);
         let mut totals = UpdateTotals::default();
+        self.before.clear();
         'epochs: for epoch in 0..self.config.epochs {
             totals.begin_epoch();
             let order = shuffled(samples, rng);
