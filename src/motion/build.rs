@@ -9,7 +9,7 @@ use crate::skeleton::Skeleton;
 use nalgebra::Vector3;
 
 /// Height of a body's lowest point up to which it touches the ground, leg lengths. Chosen: 1 cm with legs of 0.87 m.
-const TOUCHING: f64 = 0.0115;
+pub(crate) const TOUCHING: f64 = 0.0115;
 
 /// What a motion is made from: coordinates and what they don't say themselves.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,12 +111,12 @@ impl Motion {
         };
         let reach = vec![TOUCHING * leg; self.contact_bodies.len()];
         let carries = carried.by(&self.contact_bodies, &reach);
-        // Whatever was meant to stand or carry, what is above the ground doesn't touch it.
+        // Short gaps between loads were closed, and in them a body may be above the ground.
         for (f, (row, carries)) in stands.iter_mut().zip(carries).enumerate() {
             for (c, carries) in carries.into_iter().enumerate() {
                 let body = self.contact_bodies[c];
                 let lowest = skeleton.lowest_point_of(&self.bodies[f], &[body]);
-                row[c] = (row[c] || carries) && lowest <= TOUCHING * leg;
+                row[c] |= carries && lowest <= TOUCHING * leg;
             }
         }
         let support = Support {

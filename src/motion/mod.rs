@@ -49,6 +49,7 @@ mod velocity;
 mod wrench;
 
 pub use build::Draft;
+pub(crate) use build::TOUCHING;
 pub(crate) use carry::{Path, carrying};
 pub use check::Check;
 pub(crate) use contact::lasting;

@@ -11,7 +11,7 @@ use super::report::{self, Contact};
 use super::setting::Setting;
 use super::source::Source;
 use crate::clip::{Clip, LoopMode, Problem};
-use crate::motion::{Cycle, Draft, Motion, RetargetReport};
+use crate::motion::{Cycle, Draft, Motion, RetargetReport, TOUCHING};
 
 /// A trajectory with all that its motion and its report need.
 pub(super) struct Outcome {
@@ -60,7 +60,7 @@ pub(super) fn finish(
         problems,
     } = outcome.own(input);
     let contact_bodies = model.skeleton.contact_bodies();
-    let contact = contact(model, &anchors, &contact_bodies);
+    let contact = contact(model, &frames, &anchors, &contact_bodies);
     let draft = draft(&input.clip, cycle, frames, contact, contact_bodies);
     let mut motion = Motion::from_poses(model.skeleton, draft);
     // The report measures what was made: bodies and tracks of the motion, not the solver's own.
@@ -94,15 +94,24 @@ fn draft(
     }
 }
 
-/// `contact[f][c]`: whether contact body `c` stands at frame `f`.
-fn contact(model: &Model, anchors: &[Vec<Anchor>], bodies: &[usize]) -> Vec<Vec<bool>> {
-    let is_on = |a: &Anchor, body: usize| model.contact_points[a.point].body == body;
-    let stands = |frame: &[Anchor], body: usize| {
-        let mut contacts = frame.iter().filter(|a| a.is_contact());
-        contacts.any(|a| is_on(a, body))
+/// `contact[f][c]`: whether contact body `c` stands at frame `f`. Whatever was meant to stand, what is above the ground doesn't
+/// touch it.
+fn contact(
+    model: &Model,
+    frames: &[Vec<f64>],
+    anchors: &[Vec<Anchor>],
+    bodies: &[usize],
+) -> Vec<Vec<bool>> {
+    let touching = TOUCHING * model.skeleton.leg_length();
+    let row = |(qpos, frame): (&Vec<f64>, &Vec<Anchor>)| {
+        let poses = model.skeleton.forward(qpos);
+        let stands = |body: usize| {
+            let on = |a: &Anchor| model.contact_points[a.point].body == body && a.is_contact();
+            frame.iter().any(on) && model.skeleton.lowest_point_of(&poses, &[body]) <= touching
+        };
+        bodies.iter().map(|body| stands(*body)).collect()
     };
-    let row = |frame: &Vec<Anchor>| bodies.iter().map(|b| stands(frame, *b)).collect();
-    anchors.iter().map(row).collect()
+    frames.iter().zip(anchors).map(row).collect()
 }
 
 /// The source's contacts, on the skeleton's bodies: what the report compares.

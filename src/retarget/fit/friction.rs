@@ -16,6 +16,9 @@ use std::f64::consts::TAU;
 const ALLOWED: f64 = 0.25;
 /// Swings that are quicker than this are taken out, slower ones are left, s: a slow swing would move the body far. Chosen.
 const PERIOD: f64 = 1.0;
+/// Time before and after a flight in which nothing is taken out, s. Chosen: the half width of the window in which accelerations
+/// are fitted, and as much again.
+const NEAR_FLIGHT: f64 = 0.1;
 /// Longest shift that is made, leg lengths.
 const FARTHEST: f64 = 0.15;
 /// Steps of the method of conjugate gradients.
@@ -77,10 +80,20 @@ fn lacking(fit: &Fit, frames: &[Vec<f64>]) -> Vec<Vector2<f64>> {
         let left = (size - ALLOWED * GRAVITY).max(0.0);
         acceleration * (left / size.max(f64::MIN_POSITIVE))
     };
-    // What flies is led along a parabola, and that is another stage's work.
+    // What flies is led along a parabola, and that is another stage's work; beside a flight the force of the push is smeared.
+    let last = frames.len() as i64 - 1;
+    let near = (NEAR_FLIGHT * fit.fps).round() as i64;
+    let touches = |index: i64| {
+        let at = match fit.cycle {
+            Some(_) => index.rem_euclid(last + 1),
+            None => index.clamp(0, last),
+        };
+        motion.tracks.contact[at as usize].contains(&true)
+    };
     let lacking = |f: usize| {
         let wrench = &motion.tracks.root_wrench_residual[f];
-        match motion.tracks.contact[f].contains(&true) {
+        let mut around = f as i64 - near..=f as i64 + near;
+        match around.all(touches) {
             true => beyond(Vector2::new(wrench[0], wrench[1])),
             false => Vector2::zeros(),
         }
