@@ -164,7 +164,7 @@ class Reference:
 
     def allowed(self, heights, leg):
         """Bodies that may touch the ground, by frame: those that the reference has near it a little before or after."""
-        low, reach = heights < NEAR_LEGS * leg, round(AROUND_S * self.rate)
+        low, reach = heights < NEAR_LEGS * leg, int(np.floor(AROUND_S * self.rate + 0.5))
         last, wide = len(low) - 1, np.zeros_like(low)
         for frame, row in enumerate(low):
             for near in range(frame - reach, frame + reach + 1):

@@ -135,7 +135,8 @@ impl PpoConfig {
 
     /// The largest learning rate that `target_kl` may set when rates have come down to this share.
     pub(super) fn largest_rate(&self, share: f64) -> f64 {
-        (self.max_learning_rate * share).max(self.min_learning_rate)
+        let largest = self.max_learning_rate.max(self.learning_rate);
+        (largest * share).max(self.min_learning_rate)
     }
 
     /// What the loss is made of.

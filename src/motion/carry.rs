@@ -20,8 +20,12 @@ const COST: f64 = 0.01;
 /// legs of 0.8 m. A hand that slides at 0.8 m/s costs 8 times as much as one at rest, and a foot that swings 100 times.
 const HEIGHT: f64 = 0.02;
 const SPEED: f64 = 0.3;
-/// Share of the weight from which on a body surely carries, and down to which it goes on carrying. Chosen.
+/// Share of the weight from which on a body surely carries, and down to which it goes on carrying. Where even the body that carries
+/// most has less than [`MOST`], as in lying, both are less in proportion. Chosen.
 const CARRIES: [f64; 2] = [0.1, 0.03];
+const MOST: f64 = 0.4;
+/// Share of the weight that all bodies together carry at least, where one does.
+const LEAST: f64 = 0.2;
 
 /// Vertical speed from which on a point passes the ground and doesn't press on it, m/s. Chosen.
 const PASSES: f64 = 1.0;
@@ -122,10 +126,15 @@ impl Carried<'_> {
             .collect();
         let mut carries = vec![vec![false; candidates.len()]; shares.len()];
         for c in 0..candidates.len() {
-            let state = |row: &Vec<f64>| match row[c] {
-                share if share >= CARRIES[0] => State::Clear,
-                share if share >= CARRIES[1] => State::Fair,
-                _ => State::Away,
+            let state = |row: &Vec<f64>| {
+                let most = row.iter().copied().fold(0.0, f64::max);
+                let part = (most / MOST).min(1.0);
+                match row[c] {
+                    _ if row.iter().sum::<f64>() < LEAST => State::Away,
+                    share if share >= CARRIES[0] * part => State::Clear,
+                    share if share >= CARRIES[1] * part => State::Fair,
+                    _ => State::Away,
+                }
             };
             let states: Vec<State> = shares.iter().map(state).collect();
             let track = settled(&states, self.fps, self.timeline.loop_mode);

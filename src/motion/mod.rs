@@ -74,7 +74,7 @@ pub struct Tracks {
     pub linear_momentum: Vec<Vector3<f64>>,
     /// Angular momentum about the centre of mass, each body's own spin included, kg·m²/s.
     pub angular_momentum: Vec<Vector3<f64>>,
-    /// `contact[f][c]`: whether contact body `c` of [`Motion::contact_bodies`] stands on the ground.
+    /// `contact[f][c]`: whether contact body `c` of [`Motion::contact_bodies`] stands on the ground or carries the motion.
     pub contact: Vec<Vec<bool>>,
     /// Force (N) and moment about the root (N·m), world axes, that no unilateral ground contact with friction
     /// at the contact bodies can supply.
@@ -108,7 +108,8 @@ pub struct Motion {
     pub skeleton_sha256: String,
     /// Names of the skeleton's bodies, in its order.
     pub body_names: Vec<String>,
-    /// Indices of the bodies that may stand on the ground: the feet, and hands where the clip uses them.
+    /// Indices of the bodies that can touch the ground: all that have a shape. In files of earlier versions, the feet, and hands where
+    /// the clip uses them.
     pub contact_bodies: Vec<usize>,
     /// `qpos[f]`: coordinates in MuJoCo's order and conventions for the skeleton, as long as `nq`.
     pub qpos: Vec<Vec<f64>>,

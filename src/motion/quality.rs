@@ -62,14 +62,16 @@ impl Motion {
         row.and_then(|row| row.get(contact)) == Some(&true)
     }
 
-    /// `[contact][f]`: how fast a contact body slides over the ground, m/s; `None` where it doesn't stand.
+    /// `[end][f]`: how fast each foot and hand among the contact bodies slides over the ground, m/s; `None` where it doesn't stand.
     fn contact_speeds(&self, skeleton: &Skeleton) -> Vec<Vec<Option<f64>>> {
         let frames = 0..self.qpos.len();
         let twists: Vec<_> = frames
             .clone()
             .map(|f| skeleton.twists(&self.qpos[f], &self.qvel[f]))
             .collect();
+        let ends = skeleton.hands_and_feet();
         let contacts = self.contact_bodies.iter().enumerate();
+        let contacts = contacts.filter(|(_, body)| ends[**body]);
         let of = |(c, &body): (usize, &usize)| {
             let shapes = &skeleton.bodies[body].shapes;
             let speed = |f: usize| sole_speed(shapes, &self.bodies[f][body], &twists[f][body]);

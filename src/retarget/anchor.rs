@@ -3,7 +3,7 @@
 use crate::humanoid::Slot;
 use nalgebra::Vector3;
 
-/// A contact point of the skeleton that should stay where it is in a frame.
+/// A contact point of the skeleton that should be at a place, or at a height, in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Anchor {
     /// Index in [`super::model::Model::contact_points`].

@@ -50,7 +50,9 @@ fn is_below(model: &Model, top: usize, body: usize) -> bool {
 pub(super) fn is_anchored(model: &Model, slot: Slot, anchors: &[Anchor]) -> bool {
     let body = model.skeleton.slots.get(&slot);
     let stands = |body: &usize| {
-        let mut anchored = anchors.iter().map(|a| model.contact_points[a.point].body);
+        // What only has its height held goes along with the body.
+        let held = anchors.iter().filter(|a| !a.is_level);
+        let mut anchored = held.map(|a| model.contact_points[a.point].body);
         anchored.any(|point| is_below(model, *body, point))
     };
     body.is_some_and(stands)

@@ -1,8 +1,9 @@
 //! Stage 6, fit: fits one trajectory of the skeleton to its goals, with flights that fall and spin freely, inside the joint
 //! limits and above the ground.
 //!
-//! Flights can be recognised only in a trajectory that is nearly right, so the fit goes in steps, each from the result of
-//! the one before. A first fit follows the goals. Then flights are shifted onto their parabolas and turned so that they spin
+//! What carries the body and where it flies can be recognised only in a trajectory that is nearly right, so the fit goes in steps,
+//! each from the result of the one before. A first fit follows the goals. Then bodies that carry are led down to the ground, and
+//! for a body that is to perform the motion, swings that no ground could push are taken out. Then flights are shifted onto their parabolas and turned so that they spin
 //! freely, and the frames that lead to them are solved again. Frames that break a limit are solved again more stiffly. In
 //! the end flights are put back onto the paths that fitting moved them off.
 
@@ -41,8 +42,9 @@ use trajectory::Trajectory;
 /// Depth below the ground from which on a frame is solved again, metres. Chosen below the 1 cm that is asked of a motion.
 const DEEPEST: f64 = 0.004;
 
-/// How often the way is made smoother that a body takes over the ground.
+/// How often the path of a body over the ground is smoothed, and shifts that are left out, metres.
 const FRICTION_GOES: usize = 3;
+const UNSEEN: f64 = 1e-4;
 
 /// Share of the work that the first fit is, and what is done once flights fall and once they spin freely. Chosen: of a walk
 /// of 11,001 frames the first fit took 14 of 18 s, and flights take more of it.
@@ -114,7 +116,7 @@ impl<'a> Fit<'a> {
                 break;
             };
             let shift = |by: &Vector2<f64>| {
-                Some(FlightShift {
+                (by.norm() > UNSEEN).then(|| FlightShift {
                     by: by.push(0.0),
                     flies: false,
                 })

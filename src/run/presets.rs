@@ -208,6 +208,7 @@ fn booth2020() -> Plan {
             minibatch: 768,
             entropy_coefficient: 1e-5,
             learning_rate: 1e-4,
+            critic_learning_rate: None,
             target_kl: None,
             // Their noise of 1 on actions that are divided by 3.
             initial_std: 1.0 / 3.0,

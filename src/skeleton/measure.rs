@@ -108,6 +108,21 @@ impl Skeleton {
         (upright * top).z - self.lowest_point_of(&turned, &[lower])
     }
 
+    /// Which bodies are a hand or a foot, or hang on one. All are where the skeleton has no such slots.
+    pub fn hands_and_feet(&self) -> Vec<bool> {
+        use Slot::{LeftFoot, LeftHand, RightFoot, RightHand};
+        let slots = [LeftFoot, RightFoot, LeftHand, RightHand].into_iter();
+        let tops: Vec<usize> = slots
+            .filter_map(|slot| self.slots.get(&slot).copied())
+            .collect();
+        let mut ends = vec![tops.is_empty(); self.bodies.len()];
+        // Parents stand before their children.
+        for (b, body) in self.bodies.iter().enumerate() {
+            ends[b] |= tops.contains(&b) || body.parent.is_some_and(|p| ends[p]);
+        }
+        ends
+    }
+
     /// The bodies that can touch the ground: those with shapes, ascending.
     pub fn contact_bodies(&self) -> Vec<usize> {
         let bodies = self.bodies.iter().enumerate();

@@ -309,11 +309,11 @@ fn the_shortest_part_can_be_saved() {
 
 #[test]
 fn buffers_beside_the_file_allow_as_much_as_those_in_it() {
-    // 20,000 s at 30 Hz of two joints are more than any file may ask for: a megabyte allows it.
+    // 3,500 s at 172 Hz of two joints are more than any file may ask for: a megabyte allows it.
     let text = synthetic(|f| {
         f["buffers"] = json!([{ "byteLength": 2_000_000, "uri": "a.bin" }]);
     });
-    let mut bytes: Vec<u8> = [0.0_f32, 20_000.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
+    let mut bytes: Vec<u8> = [0.0_f32, 3_500.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
         .iter()
         .flat_map(|x| x.to_le_bytes())
         .collect();
@@ -322,11 +322,15 @@ fn buffers_beside_the_file_allow_as_much_as_those_in_it() {
     std::fs::write(&path, text).expect("it is written");
     let load = |bytes: &[u8]| {
         std::fs::write(folder.path().join("a.bin"), bytes).expect("it is written");
-        import::load(&path, &Options::default())
+        let options = Options {
+            fps: Some(172.0),
+            ..Options::default()
+        };
+        import::load(&path, &options)
     };
     assert!(load(&bytes).is_err());
     bytes.resize(2_000_000, 0);
-    assert_eq!(load(&bytes).expect("it imports").frames.len(), 600_001);
+    assert_eq!(load(&bytes).expect("it imports").frames.len(), 602_001);
 }
 
 #[test]

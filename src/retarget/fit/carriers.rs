@@ -15,7 +15,7 @@ use crate::retarget::model::Model;
 use nalgebra::Vector3;
 
 /// Height above the ground up to which a body may carry, leg lengths: hands, and all others. Chosen: hands of a fast flair were
-/// 12 cm above their floor. Feet are not led down, for those that carry stand, or leave the ground and come back to it.
+/// 12 cm above their floor.
 const HAND: f64 = 0.15;
 const TRUNK: f64 = 0.1;
 /// Time around its stance in which a foot or hand carries nothing else, s: the force of a landing is smeared over as much.
@@ -71,6 +71,10 @@ pub(super) fn anchors(fit: &Fit, frames: &[Vec<f64>]) -> Option<Vec<Vec<Anchor>>
             }
         }
     }
+    // The last frame of a cycle is its first.
+    if anchors.len() > frames.len() {
+        anchors[frames.len()] = anchors[0].clone();
+    }
     is_changed.then_some(anchors)
 }
 
@@ -90,10 +94,9 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
     };
     let feet = [Slot::LeftFoot, Slot::RightFoot];
     let hands = [Slot::LeftHand, Slot::RightHand];
-    let reach = |body: &usize| match (is_in(feet, *body), is_in(hands, *body)) {
-        (true, _) => f64::NEG_INFINITY,
-        (_, true) => HAND * leg,
-        _ => TRUNK * leg,
+    let reach = |body: &usize| match is_in(hands, *body) {
+        true => HAND * leg,
+        false => TRUNK * leg,
     };
     let reach: Vec<f64> = bodies.iter().map(reach).collect();
     let found = motion::carrying(skeleton, &path, bodies, &reach);
@@ -107,7 +110,8 @@ fn carries(fit: &Fit, frames: &[Vec<f64>], bodies: &[usize]) -> Vec<Vec<bool>> {
         let [before, after] = nearest(&stands[..frames.len()], fit.cycle.is_some());
         for f in 0..frames.len() {
             let mut around = [before[f], after[f]].into_iter().flatten();
-            carries[f][c] &= around.all(|(away, _)| away > near);
+            // Feet carry as well, but aren't led down: those that do stand, or leave the ground and come back to it.
+            carries[f][c] &= !is_in(feet, body) && around.all(|(away, _)| away > near);
         }
     }
     put_down(fit, frames, bodies, &found.need, &mut carries);

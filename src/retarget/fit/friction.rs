@@ -19,8 +19,8 @@ const PERIOD: f64 = 1.0;
 /// Time before and after a flight in which nothing is taken out, s. Chosen: the half width of the window in which accelerations
 /// are fitted, and as much again.
 const NEAR_FLIGHT: f64 = 0.1;
-/// Longest shift that is made, leg lengths.
-const FARTHEST: f64 = 0.15;
+/// Longest shift that is made in one go, leg lengths. Chosen: 5 cm.
+const FARTHEST: f64 = 0.06;
 /// Steps of the method of conjugate gradients.
 const STEPS: usize = 400;
 
@@ -42,9 +42,8 @@ pub(super) fn shifts(fit: &Fit, frames: &[Vec<f64>]) -> Option<Vec<Vector2<f64>>
     };
     let most = FARTHEST * fit.model.skeleton.leg_length();
     let mut shifts = way.solve(&lacking);
-    let farthest = shifts.iter().map(|s| s.norm()).fold(0.0, f64::max);
-    if farthest > most {
-        shifts.iter_mut().for_each(|s| *s *= most / farthest);
+    for shift in &mut shifts {
+        *shift *= most / shift.norm().max(most);
     }
     Some(shifts)
 }

@@ -76,6 +76,7 @@ impl Playback {
         // Blended links have momenta of their own.
         if self.transition.blend(character, passed, &mut sample.links) {
             sample.dynamics = self.reference.masses().dynamics(&sample.links);
+            self.transition.allow(&mut sample.may_touch);
         }
     }
 

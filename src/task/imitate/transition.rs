@@ -18,6 +18,8 @@ pub(super) struct Transition {
     /// Velocity of the motion before, minus that of this one at the pace at which it begins, m/s along the ground, world axes.
     excess: Vector3<f32>,
     blend: Option<Blend>,
+    /// What the motion before let touch the ground where it was left, one per contact body of the character.
+    touched: Vec<bool>,
 }
 
 impl Transition {
@@ -28,7 +30,15 @@ impl Transition {
             clock: Clock::new(time, 1.0),
             excess: Vector3::zeros(),
             blend: None,
+            touched: Vec::new(),
         }
+    }
+
+    /// Lets touch the ground, beside what the new motion lets, what was there when the one before was left: while poses blend, a
+    /// knee is still on its way up.
+    pub fn allow(&self, may_touch: &mut [bool]) {
+        let both = may_touch.iter_mut().zip(&self.touched);
+        both.for_each(|(may, touched)| *may |= touched);
     }
 
     /// The transition of a character from `present` into another motion, which has the state `begun` at its `time`, seconds.
@@ -50,6 +60,7 @@ impl Transition {
             clock,
             excess: speed - own * clock.pace(0.0) as f32,
             blend: None,
+            touched: present.may_touch.clone(),
         };
         let begins = transition.at(0.0);
         let mut links = begun.links.clone();
