@@ -214,3 +214,109 @@ fn low_on_limb(skeleton: &Skeleton, poses: &[Isometry3<f64>]) -> Vec<bool> {
     }
     low
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::clip::LoopMode;
+    use crate::motion::{Cycle, Draft, Motion};
+    use crate::skeleton::{GRAVITY, Skeleton};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    fn humanoid() -> Skeleton {
+        Skeleton::load("humanoid").expect("the built-in humanoid is valid")
+    }
+
+    /// Frames at 60 Hz, over which the whole character slides at `speed`, m/s.
+    fn motion(
+        skeleton: &Skeleton,
+        pose: &[f64],
+        speed: Vector3<f64>,
+        bodies: Vec<usize>,
+    ) -> Motion {
+        let at = |f: i32| {
+            let mut qpos = pose.to_vec();
+            (0..3).for_each(|i| qpos[i] += speed[i] * f64::from(f) / 60.0);
+            qpos
+        };
+        let draft = Draft {
+            name: "test".into(),
+            fps: 60.0,
+            loop_mode: LoopMode::Clamp,
+            cycle: Cycle::NONE,
+            qpos: (0..30).map(at).collect(),
+            contact: Some(vec![vec![false; bodies.len()]; 30]),
+            contact_bodies: bodies,
+        };
+        Motion::from_poses(skeleton, draft)
+    }
+
+    /// The rest pose on its back, on the ground.
+    fn lying(skeleton: &Skeleton) -> Vec<f64> {
+        let mut pose = skeleton.rest_qpos();
+        let back = -std::f64::consts::FRAC_PI_2;
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), back);
+        pose[3..7].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+        pose[2] -= skeleton.lowest_point(&skeleton.forward(&pose));
+        pose
+    }
+
+    /// Names of the bodies in contact in the middle of a motion.
+    fn touching(motion: &Motion) -> Vec<String> {
+        let names = motion.contact_names().into_iter();
+        let row = &motion.tracks.contact[15];
+        names
+            .zip(row)
+            .filter(|(_, on)| **on)
+            .map(|(n, _)| n)
+            .collect()
+    }
+
+    #[test]
+    fn feet_that_slide_carry() {
+        let skeleton = humanoid();
+        let (rest, all) = (skeleton.rest_qpos(), skeleton.contact_bodies());
+        let sliding = motion(&skeleton, &rest, Vector3::x() * 0.8, all.clone());
+        assert_eq!(touching(&sliding), ["right_foot", "left_foot"]);
+        // What rises at 2 m/s leaves the ground.
+        let rising = motion(&skeleton, &rest, Vector3::z() * 2.0, all);
+        assert!(touching(&rising).is_empty());
+    }
+
+    #[test]
+    fn whoever_lies_is_carried_by_what_lies_on_the_ground() {
+        let skeleton = humanoid();
+        let all = skeleton.contact_bodies();
+        let still = motion(&skeleton, &lying(&skeleton), Vector3::zeros(), all);
+        let touching = touching(&still);
+        assert!(touching.contains(&"torso".to_owned()), "{touching:?}");
+        let feet = touching.iter().any(|name| name.ends_with("foot"));
+        assert!(!feet, "{touching:?}");
+    }
+
+    /// Motions of earlier versions had feet alone.
+    #[test]
+    fn an_older_motion_gets_the_contacts_of_its_character() {
+        let skeleton = humanoid();
+        let foot = |name: &str| skeleton.bodies.iter().position(|b| b.name == name);
+        let feet: Vec<usize> = ["right_foot", "left_foot"]
+            .into_iter()
+            .filter_map(foot)
+            .collect();
+        let mut old = motion(&skeleton, &lying(&skeleton), Vector3::zeros(), feet);
+        old.tracks.contact[15][1] = true;
+        let new = old.clone().with_all_contacts(&skeleton);
+        assert_eq!(new.contact_bodies, skeleton.contact_bodies());
+        let touching = touching(&new);
+        for name in ["torso", "left_foot"] {
+            assert!(touching.contains(&name.to_owned()), "{touching:?}");
+        }
+        assert_eq!(new.clone().with_all_contacts(&skeleton), new);
+        let weight = skeleton.total_mass() * GRAVITY;
+        let force = |motion: &Motion| {
+            motion.tracks.root_wrench_residual[15]
+                .fixed_rows::<3>(0)
+                .norm()
+        };
+        assert!(force(&new) < 0.1 * weight, "{} of {weight} N", force(&new));
+    }
+}

@@ -74,3 +74,35 @@ fn below(skeleton: &Skeleton, slots: [Slot; 2]) -> Vec<bool> {
     }
     below
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::skeleton::Skeleton;
+    use crate::task::CharacterModel;
+    use nalgebra::Vector3;
+
+    /// A forearm and the hand that is welded to it are one link; only the lower one presses on the ground.
+    #[test]
+    fn of_two_bodies_on_one_link_the_lower_one_touches() {
+        let skeleton = Skeleton::load("humanoid").expect("the built-in humanoid loads");
+        let model = CharacterModel::new(skeleton).expect("it can be simulated");
+        let (rest, still) = (model.skeleton.rest_qpos(), vec![0.0; model.skeleton.nv]);
+        let mut links = model.character.states(&model.skeleton, &rest, &still);
+        let contact = |name: &str| {
+            let body = model.skeleton.bodies.iter().position(|b| b.name == name);
+            let number = model.contact(body.expect("a body of that name"));
+            &model.contacts[number.expect("it has a shape")]
+        };
+        let (hand, arm) = (contact("left_hand"), contact("left_lower_arm"));
+        assert_eq!(hand.link, arm.link);
+        // The arms hang, so the whole character goes down until the hand is on the ground.
+        let down = Vector3::z() * hand.lowest(&links);
+        links
+            .iter_mut()
+            .for_each(|link| link.pose.translation.vector -= down);
+        let pressing = vec![true; links.len()];
+        assert!(hand.touches(&links, &pressing) && !arm.touches(&links, &pressing));
+        assert!(!hand.touches(&links, &vec![false; links.len()]));
+        assert!(contact("left_foot").is_foot && !hand.is_foot && hand.is_end && !arm.is_end);
+    }
+}

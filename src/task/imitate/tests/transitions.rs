@@ -282,3 +282,21 @@ fn a_motion_is_left_where_the_next_one_is_near() {
     }
     assert!(waited > 0);
 }
+
+/// Whoever stands up from a crawl has its knees on the ground while the poses blend.
+#[test]
+fn what_was_on_the_ground_may_touch_it_in_a_transition() {
+    let (mut present, begun) = (sample(0.4), sample(0.0));
+    let knee = present.may_touch.iter().position(|may| !may);
+    let knee = knee.expect("a body that the kick keeps off the ground");
+    present.may_touch[knee] = true;
+    let transition = Transition::between(&model().character, &present, &begun, 0.0);
+    let mut allowed = begun.may_touch.clone();
+    assert!(!allowed[knee]);
+    transition.allow(&mut allowed);
+    assert!(allowed[knee]);
+    // A motion that wasn't entered from another allows nothing else.
+    let mut allowed = begun.may_touch.clone();
+    Transition::none(0.0).allow(&mut allowed);
+    assert_eq!(allowed, begun.may_touch);
+}
