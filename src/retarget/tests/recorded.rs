@@ -136,7 +136,7 @@ fn a_backflip_is_turned_for_a_body_that_performs_it() {
     let (before, after) = (changes(&kept), changes(&turned));
     assert!(after < 0.8 * before, "{after} of {before} kg·m²/s");
     let [near, far] = [kept, turned].map(|done| done.report.keypoint_error_m.mean);
-    assert!(near < far && far < 0.035, "{near} and {far} m");
+    assert!(near < far && far < 0.03, "{near} and {far} m");
 }
 
 /// In its flight, but for the velocities of the frames next to the ground, the jump's centre of mass falls freely and its
@@ -315,5 +315,5 @@ fn hands_on_shorter_arms_reach_the_ground() {
         touching(&done, &skeleton),
     );
     assert!(same * 10 > clip.frames.len(), "{same}");
-    assert!(short * 4 > same * 3, "{short} of {same}");
+    assert!(short * 10 > same * 9, "{short} of {same}");
 }
