@@ -80,6 +80,7 @@ fn goals(
         let middle = scaled.middle_of_hips(&source);
         let (qpos, bodies) = guesser.guess(middle, &rotations, goals.guess.last());
         guesser.limit_head(&qpos, &bodies, &mut rotations);
+        builder.lean(alignment, &source, &bodies, &mut rotations);
         let (points, ankle_offsets) = builder.points(&goals.keypoints, &source, &bodies);
         goals.points.push(points);
         goals.ankle_offsets.push(ankle_offsets);
@@ -192,7 +193,7 @@ impl<'a> Builder<'a> {
 
     /// The targets of the keypoints, and the ankles' offsets of [`Goals::ankle_offsets`]. `bodies` is the guess.
     ///
-    /// Hips and shoulders are where the guess has them; knees, elbows and wrists are at the end of bones that have the
+    /// Hips are where the guess has them, and shoulders in the source's direction from there; knees, elbows and wrists are at the end of bones that have the
     /// source's directions and the skeleton's lengths, so that poses look alike on a body of other proportions. Ankles are
     /// where the scaled source has them instead: with the skeleton's bones, feet would slide over the ground.
     fn points(
@@ -204,11 +205,16 @@ impl<'a> Builder<'a> {
         let at = |body: usize| bodies[body].translation.vector;
         let mut points: Vec<Vector3<f64>> = keypoints.iter().map(|key| at(key.body)).collect();
         let keypoint = |slot: Slot| keypoints.iter().position(|key| key.slot == slot);
-        // Down each limb from where the guess has its first joint, bone by bone, as far as the source has them.
+        // Down each limb from its first joint, bone by bone, as far as the source has them.
+        let shoulders = self.shoulders(source, bodies);
         for limb in ARMS.iter().chain(&LEGS) {
             let Some(mut joint) = self.skeleton.slots.get(&limb[0]).map(|b| at(*b)) else {
                 continue;
             };
+            let shoulder = shoulders.and_then(|s| Some(s[ARMS.iter().position(|a| a == limb)?]));
+            if let Some((place, k)) = shoulder.zip(keypoint(limb[0])) {
+                (joint, points[k]) = (place, place);
+            }
             for pair in limb.windows(2) {
                 let Some(bone) = self.bone(source, pair[0], pair[1]) else {
                     break;
@@ -229,6 +235,56 @@ impl<'a> Builder<'a> {
             }
         }
         (points, ankle_offsets)
+    }
+
+    /// Where the shoulders are in the source's direction from the middle of the hips, as far from it as the guess has them, and
+    /// as far apart. A rig may bend its trunk elsewhere than the skeleton, or have a rest pose that leans, so orientations
+    /// alone would lean otherwise than the source does.
+    fn shoulders(
+        &self,
+        source: &[Isometry3<f64>],
+        bodies: &[Isometry3<f64>],
+    ) -> Option<[Vector3<f64>; 2]> {
+        let ends = |at: &dyn Fn(Slot) -> Option<Vector3<f64>>, limbs: &[[Slot; 3]; 2]| {
+            Some([at(limbs[0][0])?, at(limbs[1][0])?])
+        };
+        let middle = |[left, right]: [Vector3<f64>; 2]| (left + right) / 2.0;
+        let ours = |slot: Slot| Some(bodies[*self.skeleton.slots.get(&slot)?].translation.vector);
+        let theirs = |slot: Slot| self.scaled.point(source, slot);
+        let (hips, shoulders) = (ends(&ours, &LEGS)?, ends(&ours, &ARMS)?);
+        let wanted = ends(&theirs, &ARMS)?;
+        let length = (middle(shoulders) - middle(hips)).norm();
+        let half = (shoulders[0] - shoulders[1]).norm() / 2.0;
+        let up = (middle(wanted) - middle(ends(&theirs, &LEGS)?)).try_normalize(1e-9)?;
+        let aside = (wanted[0] - wanted[1]).try_normalize(1e-9)? * half;
+        let center = middle(hips) + up * length;
+        Some([center + aside, center - aside])
+    }
+
+    /// Turns the chest's target so that it leads to the shoulders' places.
+    fn lean(
+        &self,
+        alignment: &Alignment,
+        source: &[Isometry3<f64>],
+        bodies: &[Isometry3<f64>],
+        rotations: &mut [UnitQuaternion<f64>],
+    ) {
+        let chest = self.skeleton.slots.get(&Slot::Chest);
+        let (Some(chest), Some([left, right])) = (chest, self.shoulders(source, bodies)) else {
+            return;
+        };
+        let at = |body: usize| bodies[body].translation.vector;
+        let shoulder = |side: usize| self.skeleton.slots.get(&ARMS[side][0]).map(|b| at(*b));
+        let (Some(a), Some(b)) = (shoulder(0), shoulder(1)) else {
+            return;
+        };
+        let [from, to] = [(a + b) / 2.0, (left + right) / 2.0].map(|p| p - at(*chest));
+        let lean = UnitQuaternion::rotation_between(&from, &to);
+        for (bind, rotation) in alignment.binds.iter().zip(rotations) {
+            if bind.slot == Slot::Chest {
+                *rotation = lean.unwrap_or_else(UnitQuaternion::identity) * *rotation;
+            }
+        }
     }
 
     /// From the source's hip joint to the skeleton's, horizontally, metres: feet stand as far apart as suits the skeleton's
