@@ -37,6 +37,7 @@ mod seam;
 mod setting;
 mod source;
 mod stance;
+mod way;
 
 pub use error::RetargetError;
 pub use options::Options;

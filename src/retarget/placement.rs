@@ -7,6 +7,7 @@
 
 mod ground;
 mod hands;
+mod nailed;
 mod swing;
 mod travel;
 
@@ -19,6 +20,7 @@ use super::pose::Posed;
 use super::setting::Setting;
 use super::source::Source;
 use crate::clip::Problem;
+use crate::humanoid::Slot;
 use ground::{Ground, Points};
 use nalgebra::Vector3;
 
@@ -30,7 +32,7 @@ pub(super) struct Placed {
     pub source: Source,
     /// When the source's feet and hands are on the ground.
     pub contacts: Vec<SourceContact>,
-    /// The warning `travel-restored`.
+    /// The warning `travel-restored` or `hips-restored`.
     pub problem: Option<Problem>,
 }
 
@@ -52,26 +54,35 @@ pub(super) fn place(posed: Posed, model: &Model, setting: &Setting, first: usize
     }
 }
 
-/// Gives a clip that walks on the spot the travel that its sliding feet show, with a warning.
-fn with_travel(
-    Posed {
+/// Gives a clip that walks on the spot the travel that its sliding feet show, and one whose hips are nailed the way that they
+/// lost, with a warning.
+fn with_travel(posed: Posed, model: &Model, setting: &Setting) -> (Posed, Option<Problem>) {
+    if let Some(velocity) = travel::missing(&posed.goals, model, setting) {
+        // From the first frame on, so that the clip starts where it did.
+        let by = |f: usize| velocity * (f as f64 / setting.fps);
+        return (shifted(posed, by), Some(travel::problem(&velocity)));
+    }
+    let hips = posed.source.points.get(&Slot::Hips);
+    let points = ground_points(model, &posed.goals);
+    let com = |qpos: &Vec<f64>| model.skeleton.com(&model.skeleton.forward(qpos));
+    let com: Vec<_> = posed.goals.guess.iter().map(com).collect();
+    match hips.and_then(|hips| nailed::way(hips, &com, &points, setting)) {
+        Some(way) => (shifted(posed, |f| way[f]), Some(nailed::problem(&way))),
+        None => (posed, None),
+    }
+}
+
+/// Goals and source with every frame shifted, metres.
+fn shifted(posed: Posed, by: impl Fn(usize) -> Vector3<f64>) -> Posed {
+    let Posed {
         mut goals,
         mut source,
-    }: Posed,
-    model: &Model,
-    setting: &Setting,
-) -> (Posed, Option<Problem>) {
-    let velocity = travel::missing(&goals, model, setting);
-    if let Some(velocity) = velocity {
-        for f in 0..goals.frames() {
-            // From the first frame on, so that the clip starts where it did.
-            let by = velocity * (f as f64 / setting.fps);
-            goals.shift_frame(f, &by);
-            source.shift_frame(f, &by);
-        }
+    } = posed;
+    for f in 0..goals.frames() {
+        goals.shift_frame(f, &by(f));
+        source.shift_frame(f, &by(f));
     }
-    let problem = velocity.map(|velocity| travel::problem(&velocity));
-    (Posed { goals, source }, problem)
+    Posed { goals, source }
 }
 
 /// Finds the ground under the goals.
@@ -122,19 +133,8 @@ fn with_hands_down(
 }
 
 /// Moves everything to where the ground is z = 0 and the root is above the origin in frame `first`.
-fn at_origin(
-    Posed {
-        mut goals,
-        mut source,
-    }: Posed,
-    ground: &Ground,
-    first: usize,
-) -> Posed {
-    let root = goals.root(first);
+fn at_origin(posed: Posed, ground: &Ground, first: usize) -> Posed {
+    let root = posed.goals.root(first);
     let home = Vector3::new(-root.x, -root.y, -ground.floor - ground.lift);
-    for f in 0..goals.frames() {
-        goals.shift_frame(f, &home);
-        source.shift_frame(f, &home);
-    }
-    Posed { goals, source }
+    shifted(posed, |_| home)
 }

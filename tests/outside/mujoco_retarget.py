@@ -37,6 +37,8 @@ LIMBS = [
 STILL_M_S, LOW_M = 0.05, 0.03
 # Sole points this near to the lowest one are on the ground, if that is this near to z = 0.
 SOLE_M, GROUND_M = 0.01, 0.03
+# Hips that stay within this of one place never move, metres.
+NAILED_M = 0.002
 
 
 def load(path):
@@ -238,11 +240,14 @@ def measure(rig, clip, motion):
     errors = [np.linalg.norm(at[s] - hips - p, axis=1) for s, p in wanted.items()]
     path = middle(source, "left-upper-leg", "right-upper-leg") * scale
     away = hips - path
-    restored = any(p["id"] == "travel-restored" for p in moved["report"]["problems"])
-    if restored:
+    restored = any(p["id"] in ("travel-restored", "hips-restored") for p in moved["report"]["problems"])
+    # Hips that never move have no way to compare with.
+    nailed = "hips" in source and np.ptp(source["hips"] * scale, axis=0).max() < NAILED_M
+    if restored and not nailed:
         time = np.arange(count)[:, None] / max(count - 1, 1)
         away = away - time * (away[-1] - away[0])
-    errors.append(np.linalg.norm(away - np.median(away, axis=0), axis=1))
+    if not nailed:
+        errors.append(np.linalg.norm(away - np.median(away, axis=0), axis=1))
     step = lambda p: np.linalg.norm(np.diff(p, axis=0), axis=1)
     jumps = [step(at[s] - hips) - step(p) for s, p in wanted.items()]
     speeds = []

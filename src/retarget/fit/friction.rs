@@ -7,6 +7,7 @@
 use super::Fit;
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Draft, Motion};
+use crate::retarget::way::Way;
 use crate::skeleton::GRAVITY;
 use nalgebra::Vector2;
 use std::f64::consts::TAU;
@@ -21,8 +22,6 @@ const PERIOD: f64 = 1.0;
 const NEAR_FLIGHT: f64 = 0.1;
 /// Longest shift that is made in one go, leg lengths. Chosen: 5 cm.
 const FARTHEST: f64 = 0.06;
-/// Steps of the method of conjugate gradients.
-const STEPS: usize = 400;
 
 /// How every frame is shifted over the ground, metres; `None` where the ground can push as the motion asks.
 pub(super) fn shifts(fit: &Fit, frames: &[Vec<f64>]) -> Option<Vec<Vector2<f64>>> {
@@ -36,12 +35,16 @@ pub(super) fn shifts(fit: &Fit, frames: &[Vec<f64>]) -> Option<Vec<Vector2<f64>>
     }
     let way = Way {
         repeats: fit.cycle.is_some(),
-        rate: fit.fps * fit.fps,
+        fps: fit.fps,
         // A swing of this period is taken out half.
-        hold: (TAU / PERIOD).powi(4),
+        stay: (TAU / PERIOD).powi(4),
+        follow: 0.0,
+        push: 1.0,
     };
     let most = FARTHEST * fit.model.skeleton.leg_length();
-    let mut shifts = way.solve(&lacking);
+    let speeds = vec![Vector2::zeros(); lacking.len()];
+    let wished: Vec<_> = lacking.iter().map(|a| -a).collect();
+    let mut shifts = way.solve(&speeds, &wished);
     for shift in &mut shifts {
         *shift *= most / shift.norm().max(most);
     }
@@ -98,115 +101,4 @@ fn lacking(fit: &Fit, frames: &[Vec<f64>]) -> Vec<Vector2<f64>> {
         }
     };
     (0..frames.len()).map(lacking).collect()
-}
-
-/// The least-squares problem of a way: its accelerations take out what is lacking, and it stays near.
-struct Way {
-    repeats: bool,
-    /// Frames per second, squared.
-    rate: f64,
-    /// Weight of a shift's square beside that of an acceleration, 1/s⁴.
-    hold: f64,
-}
-
-impl Way {
-    /// The shifts s that minimise Σ ‖s̈ + lacking‖² + hold ‖s‖².
-    fn solve(&self, lacking: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
-        let mut shifts = vec![Vector2::zeros(); lacking.len()];
-        // Conjugate gradients of Hestenes and Stiefel (1952) on (DᵀD + hold) s = −Dᵀ lacking, both axes at once.
-        let wanted: Vec<_> = lacking.iter().map(|a| -a).collect();
-        let mut rest = self.transposed(&wanted);
-        let mut way = rest.clone();
-        let mut size = square(&rest);
-        let enough = 1e-12 * size;
-        for _ in 0..STEPS {
-            if size <= enough {
-                break;
-            }
-            let ahead = self.normal(&way);
-            let step = size / dot(&way, &ahead);
-            for i in 0..shifts.len() {
-                shifts[i] += way[i] * step;
-                rest[i] -= ahead[i] * step;
-            }
-            let next = square(&rest);
-            let turn = next / size;
-            way.iter_mut()
-                .zip(&rest)
-                .for_each(|(w, r)| *w = r + *w * turn);
-            size = next;
-        }
-        shifts
-    }
-
-    /// (DᵀD + hold) s.
-    fn normal(&self, s: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
-        let mut out = self.transposed(&self.acceleration(s));
-        out.iter_mut().zip(s).for_each(|(o, s)| *o += s * self.hold);
-        out
-    }
-
-    /// D s: second differences. A way that ends has none at its ends.
-    fn acceleration(&self, s: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
-        let mut out = vec![Vector2::zeros(); s.len()];
-        for (before, f, after) in self.triples(s.len()) {
-            out[f] = (s[before] - s[f] * 2.0 + s[after]) * self.rate;
-        }
-        out
-    }
-
-    /// Dᵀ a.
-    fn transposed(&self, a: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
-        let mut out = vec![Vector2::zeros(); a.len()];
-        for (before, f, after) in self.triples(a.len()) {
-            let part = a[f] * self.rate;
-            out[before] += part;
-            out[f] -= part * 2.0;
-            out[after] += part;
-        }
-        out
-    }
-
-    /// Every frame that has neighbours, between them.
-    fn triples(&self, count: usize) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
-        let inner = match self.repeats {
-            true => 0..count,
-            false => 1..count.saturating_sub(1).max(1),
-        };
-        inner.map(move |f| ((f + count - 1) % count, f, (f + 1) % count))
-    }
-}
-
-fn dot(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
-}
-
-fn square(a: &[Vector2<f64>]) -> f64 {
-    dot(a, a)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A quick swing is taken out, a slow one is left: s = ρ ω²/(ω⁴ + hold).
-    #[test]
-    fn quick_swings_are_taken_out() {
-        let fps = 60.0;
-        let way = Way {
-            repeats: true,
-            rate: fps * fps,
-            hold: (TAU / PERIOD).powi(4),
-        };
-        for (period, frames) in [(0.4, 24), (2.0, 120)] {
-            let omega: f64 = TAU / period;
-            let swing = |f: usize| Vector2::new((omega * f as f64 / fps).sin(), 0.0);
-            let lacking: Vec<_> = (0..frames).map(swing).collect();
-            let found = way.solve(&lacking);
-            let expected = omega.powi(2) / (omega.powi(4) + way.hold);
-            for (s, a) in found.iter().zip(&lacking) {
-                assert!((s - a * expected).norm() < 0.02 * expected, "{s} {a}");
-            }
-        }
-    }
 }

@@ -1,6 +1,7 @@
 //! Retargeting, on rigs that are built by hand and on clips that people recorded.
 
 mod jumps;
+mod nailed;
 mod recorded;
 mod trimmed;
 
