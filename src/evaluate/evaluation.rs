@@ -52,6 +52,9 @@ pub struct Evaluation {
     pub measures: Vec<Measure>,
     /// The episodes that failed.
     pub failures: Vec<FailedEpisode>,
+    /// Starts, as shares of all possible ones, from which no body could do what is asked. They are performed and measured
+    /// like all others.
+    pub beyond_reach: Vec<f64>,
     /// Whether these episodes show that the case is learned, as the task sees it.
     pub verdict: Verdict,
     /// One more episode, from standing still in the rest pose.
@@ -164,21 +167,63 @@ fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
             failures: failures(episodes),
         }
     };
-    let (measured, failed) = (measures(task, phases), failures(phases));
+    let beyond_reach: Vec<f64> = phases.iter().filter_map(|e| beyond(task, e)).collect();
+    let (mut measured, failed) = (measures(task, phases), failures(phases));
+    let judged = match beyond_reach.is_empty() || beyond_reach.len() == count {
+        true => measured.clone(),
+        false => judge_within_reach(task, phases, &mut measured),
+    };
     let starts: Vec<f64> = failed.iter().map(|episode| episode.start).collect();
     let verdict = task.verdict(&Performance {
         episodes: count,
-        measures: &measured,
+        measures: &judged,
         failed: &starts,
+        beyond_reach: &beyond_reach,
     });
     Evaluation {
         episodes: count,
         measures: measured,
         failures: failed,
+        beyond_reach,
         verdict,
         from_rest: more(rest),
         perturbed: (!disturbed.is_empty()).then(|| more(disturbed)),
     }
+}
+
+/// Where an episode started, as a share of all possible starts, if no body could do what was asked there.
+fn beyond(task: &dyn Task, episode: &Episode) -> Option<f64> {
+    match episode.start.state {
+        StartState::Reference(start) => {
+            Some(start).filter(|start| task.is_beyond_reach(episode.start.case, *start))
+        }
+        StartState::Rest => None,
+    }
+}
+
+/// The same measures over the starts within reach, which have to be good enough; those over all starts needn't. The survival
+/// among them is put behind that from all starts.
+fn judge_within_reach(
+    task: &dyn Task,
+    phases: &[Episode],
+    measured: &mut Vec<Measure>,
+) -> Vec<Measure> {
+    let within = phases.iter().filter(|e| beyond(task, e).is_none());
+    let within: Vec<Episode> = within.cloned().collect();
+    let judged = measures(task, &within);
+    for (all, within) in measured.iter_mut().zip(&judged) {
+        if within.is_enough() && !all.is_enough() {
+            all.enough = None;
+        }
+    }
+    let survival = Measure {
+        name: "survival_within_reach",
+        label: "survival, from starts within reach",
+        holds_disturbed: false,
+        ..judged[0]
+    };
+    measured.insert(1, survival);
+    judged
 }
 
 fn failures(episodes: &[Episode]) -> Vec<FailedEpisode> {
@@ -231,6 +276,7 @@ impl Serialize for Evaluation {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         fields(&mut map, self.episodes, &self.measures, &self.failures)?;
+        map.serialize_entry("beyond_reach", &self.beyond_reach)?;
         map.serialize_entry("learned", &self.verdict.learned)?;
         map.serialize_entry("verdict", &self.verdict.text)?;
         map.serialize_entry("from_rest", &self.from_rest)?;

@@ -38,6 +38,7 @@ mod momentum;
 mod nnls;
 mod phase;
 mod quality;
+mod reach;
 mod report;
 mod sample;
 pub mod skate;

@@ -211,6 +211,32 @@ fn lying_is_explained_by_what_lies_on_the_ground() {
     }
 }
 
+/// A body that stands and is dragged over the ground at 30 m/s² for a tenth of a second: 3 m/s that no ground gives. What leads to
+/// it is beyond reach, what follows isn't.
+#[test]
+fn who_is_dragged_cannot_be_followed() {
+    let s = humanoid();
+    let mut qpos = vec![s.rest_qpos(); 121];
+    for (f, q) in qpos.iter_mut().enumerate() {
+        let t = (f as f64 / 60.0 - 1.0).clamp(0.0, 0.1);
+        let after = (f as f64 / 60.0 - 1.1).max(0.0);
+        q[0] += 15.0 * t * t + 3.0 * after;
+    }
+    let motion = Motion::from_poses(&s, draft(&s, qpos, 60.0));
+    let spans = motion.beyond_reach(&s);
+    let [[from, to]] = spans[..] else {
+        panic!("{spans:?}");
+    };
+    assert!(
+        (0.75..0.9).contains(&from) && (1.0..1.15).contains(&to),
+        "{spans:?}"
+    );
+
+    let still = vec![s.rest_qpos(); 121];
+    let motion = Motion::from_poses(&s, draft(&s, still, 60.0));
+    assert!(motion.beyond_reach(&s).is_empty());
+}
+
 #[test]
 fn free_fall_needs_nothing() {
     let s = humanoid();
@@ -225,6 +251,7 @@ fn free_fall_needs_nothing() {
     for w in &motion.tracks.root_wrench_residual {
         assert!(w.norm() < 1e-6);
     }
+    assert!(motion.beyond_reach(&s).is_empty());
 }
 
 /// A point that rests for 0.6 s and swings for 0.4 s, both at any size and frame rate.

@@ -18,7 +18,7 @@ const MEMORY: f64 = 1e5;
 const PRIOR: f64 = 10.0;
 
 /// What [`StartDistribution`] needs to know of a motion. A task without motions has one span, of no length.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Span {
     /// Seconds of a cycle.
     pub duration: f64,
@@ -26,6 +26,17 @@ pub struct Span {
     pub last_start: f64,
     /// Whether it goes on with its first frame after its last.
     pub wraps: bool,
+    /// Parts of it, seconds, in order, in which no body could start and follow.
+    pub beyond_reach: Vec<[f64; 2]>,
+}
+
+impl Span {
+    /// The share of a part of it, seconds, from which a body could follow.
+    fn within_reach(&self, from: f64, length: f64) -> f64 {
+        let beyond = |[begin, end]: &[f64; 2]| (end.min(from + length) - begin.max(from)).max(0.0);
+        let beyond: f64 = self.beyond_reach.iter().map(beyond).sum();
+        (1.0 - beyond / length).max(0.0)
+    }
 }
 
 /// A moment of one of a task's motions.
@@ -44,6 +55,8 @@ struct Bin {
     /// Seconds, as are the rest.
     from: f64,
     length: f64,
+    /// Share of it from which a body could follow.
+    within_reach: f64,
     /// Bins that a start here goes through within [`AHEAD`], with the time spent in each.
     ahead: Vec<(usize, f64)>,
 }
@@ -68,7 +81,8 @@ impl Tally {
 }
 
 /// Draws where episodes begin. A share of them begins where failure is likely, in proportion to the failures within a
-/// second of such a start; all others begin in any motion, and anywhere in it. A long motion counts like a short one.
+/// second of such a start, unless no body could follow from there; all others begin in any motion, and anywhere in it. A long
+/// motion counts like a short one.
 #[derive(Clone, Debug)]
 pub struct StartDistribution {
     bins: Vec<Bin>,
@@ -91,7 +105,7 @@ impl StartDistribution {
     pub fn new(spans: &[Span], anywhere: bool, share: f64, control_dt: f64) -> Self {
         let (mut bins, mut motions) = (Vec::new(), Vec::new());
         for (motion, span) in spans.iter().enumerate() {
-            motions.push((*span, bins.len()));
+            motions.push((span.clone(), bins.len()));
             bins.extend(bins_of(motion, span, bins.len(), anywhere));
         }
         let mut starts = StartDistribution {
@@ -115,7 +129,7 @@ impl StartDistribution {
 
     /// The bin of a moment; later cycles count like the first.
     pub fn bin(&self, moment: Moment) -> usize {
-        let (span, first) = self.motions[moment.motion];
+        let (span, first) = &self.motions[moment.motion];
         let end = self.motions.get(moment.motion + 1);
         let count = end.map_or(self.bins.len(), |(_, next)| *next) - first;
         let within = if span.wraps {
@@ -123,7 +137,7 @@ impl StartDistribution {
         } else {
             moment.time
         };
-        let at = (within / self.bins[first].length) as usize;
+        let at = (within / self.bins[*first].length) as usize;
         first + at.min(count - 1)
     }
 
@@ -205,7 +219,9 @@ impl StartDistribution {
             let reach = start_range(&self.motions[bin.motion].0);
             bin.length / (reach * self.motions.len() as f64)
         };
-        let likely: Vec<f64> = self.bins.iter().map(|b| even(b) * expected(b)).collect();
+        // What fails from where no body could follow is no failure to be mended by more of it.
+        let likely = |bin: &Bin| even(bin) * expected(bin) * bin.within_reach;
+        let likely: Vec<f64> = self.bins.iter().map(likely).collect();
         let all: f64 = likely.iter().sum();
         // Nothing has failed yet: all starts are even.
         let share = if all > 0.0 { self.share } else { 0.0 };
@@ -239,6 +255,10 @@ fn bins_of(motion: usize, span: &Span, first: usize, anywhere: bool) -> Vec<Bin>
         motion,
         from: i as f64 * length,
         length,
+        within_reach: match anywhere {
+            true => span.within_reach(i as f64 * length, length),
+            false => 1.0,
+        },
         ahead: ahead(i, count, length, anywhere, span.wraps)
             .into_iter()
             .map(|(j, seconds)| (first + j, seconds))
@@ -277,6 +297,7 @@ mod tests {
             duration,
             last_start: duration,
             wraps,
+            beyond_reach: Vec::new(),
         }
     }
 
@@ -306,6 +327,23 @@ mod tests {
         let early = |p: &Moment| p.motion == 1 && p.time < 1.5;
         assert!((share(&moments, early) - 0.125).abs() < 0.01);
         assert!(moments.iter().all(|p| p.time <= 6.0));
+    }
+
+    /// Where no body could follow, failures lead to no more starts; even ones remain.
+    #[test]
+    fn what_is_beyond_reach_is_no_goal() {
+        let spans = [Span {
+            beyond_reach: vec![[5.0, 7.0]],
+            ..span(10.0, false)
+        }];
+        let mut starts = StartDistribution::new(&spans, true, 0.5, DT);
+        let moment = Moment {
+            motion: 0,
+            time: 6.5,
+        };
+        failing(&mut starts, moment, 1000);
+        let near = share(&draws(&starts, 20_000), |p| (5.0..7.0).contains(&p.time));
+        assert!((near - 0.5 * 0.2).abs() < 0.01, "{near}");
     }
 
     #[test]

@@ -7,10 +7,12 @@ use super::episode::Measure;
 pub struct Performance<'a> {
     /// How many episodes were performed, from starts spread evenly over all.
     pub episodes: usize,
-    /// What was measured over all of them.
+    /// What was measured over all of them, or where some starts are beyond reach, over all others.
     pub measures: &'a [Measure],
     /// The starts of those that failed, as shares of all possible starts.
     pub failed: &'a [f64],
+    /// The starts from which no body could do what was asked, likewise.
+    pub beyond_reach: &'a [f64],
 }
 
 impl Performance<'_> {

@@ -187,13 +187,18 @@ fn keep(
 
 /// The first few of the phases from which the agent fails.
 fn failed(failures: &[FailedEpisode], how: &str) -> Option<Row> {
-    let starts = failures.iter().take(MOST_PHASES);
-    let mut phases: Vec<String> = starts.map(|f| format!("{:.2}", f.start)).collect();
-    if failures.len() > MOST_PHASES {
+    let starts: Vec<f64> = failures.iter().map(|f| f.start).collect();
+    phases(&format!("fails from phase{how}"), &starts)
+}
+
+/// The first few of these phases.
+fn phases(name: &str, starts: &[f64]) -> Option<Row> {
+    let first = starts.iter().take(MOST_PHASES);
+    let mut phases: Vec<String> = first.map(|start| format!("{start:.2}")).collect();
+    if starts.len() > MOST_PHASES {
         phases.push("…".to_owned());
     }
-    let name = format!("fails from phase{how}");
-    (!phases.is_empty()).then(|| Row(name, phases.join(" "), String::new()))
+    (!phases.is_empty()).then(|| Row(name.to_owned(), phases.join(" "), String::new()))
 }
 
 /// What the evaluation comes to in a sentence, with `advice` if there is any, and a table per motion.
@@ -234,6 +239,7 @@ fn table(result: &CaseEvaluation) -> String {
     let perturbed = found.perturbed.iter();
     let perturbed = perturbed.filter_map(|p| failed(&p.failures, ", disturbed"));
     rows.extend(failed(&found.failures, "").into_iter().chain(perturbed));
+    rows.extend(phases("out of reach from phase", &found.beyond_reach));
     let line = |(number, Row(name, value, good)): (usize, &Row)| {
         let indent = if number == 0 { "" } else { "  " };
         let width = 40 - indent.len();

@@ -151,6 +151,7 @@ impl Task for Imitate {
             duration: reference.duration(),
             last_start: reference.last_start(control_dt),
             wraps: reference.loop_mode() == LoopMode::Wrap,
+            beyond_reach: reference.beyond_reach.clone(),
         };
         let spans: Vec<Span> = self.references.iter().map(span).collect();
         StartDistribution::new(
@@ -159,6 +160,12 @@ impl Task for Imitate {
             self.settings.adaptive_starts,
             control_dt,
         )
+    }
+
+    fn is_beyond_reach(&self, case: usize, share: f64) -> bool {
+        let last = |r: &Arc<Reference>| r.last_start(self.settings.physics.control_dt());
+        let reference = self.references.get(case);
+        reference.is_some_and(|r| r.is_beyond_reach(share * last(r)))
     }
 
     fn cases(&self) -> &[Case] {

@@ -44,6 +44,8 @@ pub struct Reference {
     /// For every frame, positions and velocities of its links as [`seen_from_root`] sees them.
     grounded: Vec<Vec<[Vector3<f32>; 2]>>,
     masses: Masses,
+    /// As [`Motion::beyond_reach`] has them.
+    pub beyond_reach: Vec<[f64; 2]>,
     /// Bodies that the motion puts on the ground.
     pub contact_bodies: Vec<usize>,
     /// Their numbers among [`CharacterModel::contacts`].
@@ -92,6 +94,7 @@ impl Reference {
             frames,
             contacts: times().map(contact).collect(),
             cycle: motion.cycle,
+            beyond_reach: motion.beyond_reach(skeleton),
             masses: Masses::new(&model.character),
             contact_bodies: motion.contact_bodies.clone(),
             contacts_of_motion: motion
@@ -113,6 +116,12 @@ impl Reference {
             LoopMode::Wrap => self.duration,
             LoopMode::Clamp => (self.duration - 2.0 * control_dt).max(0.0),
         }
+    }
+
+    /// Whether no body could start at `time`, seconds of the first cycle, and follow.
+    pub fn is_beyond_reach(&self, time: f64) -> bool {
+        let mut spans = self.beyond_reach.iter();
+        spans.any(|[from, to]| (*from..*to).contains(&time))
     }
 
     /// Whether the motion repeats.

@@ -39,6 +39,14 @@ fn missed(found: &Performance) -> Option<String> {
 /// How well it is learned.
 fn learned(found: &Performance) -> String {
     let turning = found.measure("angular_momentum_error");
+    let is_beyond = |start: &&f64| found.beyond_reach.contains(start);
+    if !found.failed.is_empty() && found.failed.iter().all(|start| is_beyond(&start)) {
+        let all = found.episodes - found.failed.len();
+        return format!(
+            "learned: it lasts from {all} start phases; from {} no body could follow",
+            phases(found.failed)
+        );
+    }
     match found.failed {
         // Whoever stands performs such a motion, trained or not.
         [] if turning.is_some_and(|error| error.value.is_nan()) => {

@@ -23,6 +23,7 @@ fn with(survival: f64, error_mm: f64, failed: &[f64], more: &[Measure]) -> Verdi
         episodes: 32,
         measures: &measures,
         failed,
+        beyond_reach: &[0.25, 0.28125],
     })
 }
 
@@ -37,6 +38,14 @@ fn a_verdict_says_what_is_wrong() {
         some.learned
             && some.text == "learned, but it fails from phases 0.00, 0.03, 0.50 and 1 more"
     );
+    let beyond = of(1.0, 20.0, &[0.25, 0.28125]);
+    assert!(beyond.learned);
+    assert_eq!(
+        beyond.text,
+        "learned: it lasts from 30 start phases; from phases 0.25, 0.28 no body could follow"
+    );
+    let more = of(0.96, 20.0, &[0.25, 0.5]);
+    assert_eq!(more.text, "learned, but it fails from phases 0.25, 0.50");
     let loose = of(1.0, 83.4, &[]);
     assert!(
         !loose.learned && loose.text == "not yet learned: it lasts, but its bodies are 83 mm off"
@@ -91,6 +100,7 @@ fn what_is_no_number_is_not_enough() {
         episodes: 32,
         measures: &[],
         failed: &[],
+        beyond_reach: &[],
     };
     assert!(!verdict(&nothing).learned);
 }

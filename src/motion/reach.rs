@@ -1,0 +1,87 @@
+//! From which frames a body could follow a motion.
+//!
+//! Where no ground could give the motion its force and moment (see [`wrench`](super::wrench)), a body that starts in its
+//! state and does all it can is soon elsewhere: it lacks the momentum that the motion gains from nowhere. How much that
+//! is within the next moments says whether the start can be asked of anybody.
+
+use super::Motion;
+use crate::clip::LoopMode;
+use crate::skeleton::{GRAVITY, Skeleton};
+use nalgebra::Vector3;
+
+/// Time that is looked ahead, s. Chosen: a step is taken in about twice that, and corrects what came before.
+const AHEAD: f64 = 0.2;
+/// Most speed that may be lacking after that time, of the centre of mass as of a turn at a leg's length, in units of √(g l)
+/// with l the length of the leg: 0.5 m/s for a leg of 0.9 m. Chosen: `docs/notebook/starts.md` has what lies above.
+const LACKING: f64 = 0.17;
+
+impl Motion {
+    /// Spans of time in which no body could start and follow, seconds from the first frame, in order.
+    ///
+    /// A frame is meant where, within [`AHEAD`], the residual force adds up to more than m v, or the residual moment about
+    /// the centre of mass to more than m l v, with m the mass, l the length of a leg and v = [`LACKING`] √(g l).
+    pub fn beyond_reach(&self, skeleton: &Skeleton) -> Vec<[f64; 2]> {
+        let leg = skeleton.leg_length();
+        let most = LACKING * (GRAVITY * leg).sqrt() * skeleton.total_mass();
+        let lacking = self.lacking();
+        let is_beyond = |[linear, angular]: &[f64; 2]| *linear > most || *angular > most * leg;
+        let mut spans: Vec<[f64; 2]> = Vec::new();
+        // A frame stands for half a frame's time on either side.
+        let half = 0.5 / self.fps;
+        let frames = lacking.iter().enumerate();
+        for (f, _) in frames.filter(|(_, lacking)| is_beyond(lacking)) {
+            let time = f as f64 / self.fps;
+            let (from, to) = ((time - half).max(0.0), (time + half).min(self.duration()));
+            match spans.last_mut() {
+                Some(last) if last[1] >= from - half => last[1] = to,
+                _ => spans.push([from, to]),
+            }
+        }
+        spans
+    }
+
+    /// Linear momentum (N·s) and angular momentum about the centre of mass (N·m·s) that the motion gains from nowhere within
+    /// [`AHEAD`] of every frame.
+    fn lacking(&self) -> Vec<[f64; 2]> {
+        let residual = self.residual_about_com();
+        let ahead = ((AHEAD * self.fps).round() as usize).max(1);
+        let from = |f: usize| {
+            // A motion that ends asks for nothing after its end.
+            let frames = (f..f + ahead).map_while(|index| self.residual_at(&residual, index));
+            let sum = frames.fold([Vector3::zeros(); 2], |[force, moment], [f, m]| {
+                [force + f, moment + m]
+            });
+            sum.map(|sum| sum.norm() / self.fps)
+        };
+        (0..residual.len()).map(from).collect()
+    }
+
+    /// The residual at a frame, of a later cycle where the index is past the end of one that repeats.
+    fn residual_at(
+        &self,
+        residual: &[[Vector3<f64>; 2]],
+        index: usize,
+    ) -> Option<[Vector3<f64>; 2]> {
+        match self.loop_mode {
+            LoopMode::Clamp => residual.get(index).copied(),
+            LoopMode::Wrap => {
+                // The last frame is the first of the next cycle.
+                let cycle = residual.len().saturating_sub(1).max(1);
+                let turn = self.cycle_offset((index / cycle) as i64).rotation;
+                Some(residual[index % cycle].map(|v| turn * v))
+            }
+        }
+    }
+
+    /// Residual force (N) and moment about the centre of mass (N·m) of every frame, world axes.
+    fn residual_about_com(&self) -> Vec<[Vector3<f64>; 2]> {
+        let wrenches = self.tracks.root_wrench_residual.iter();
+        let frames = wrenches.zip(&self.tracks.com).zip(&self.bodies);
+        let about_com = frames.map(|((wrench, com), bodies)| {
+            let force = wrench.fixed_rows::<3>(0).into_owned();
+            let arm = bodies[0].translation.vector - com;
+            [force, wrench.fixed_rows::<3>(3) + arm.cross(&force)]
+        });
+        about_com.collect()
+    }
+}
