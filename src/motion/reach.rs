@@ -12,8 +12,9 @@ use nalgebra::Vector3;
 /// Time that is looked ahead, s. Chosen: a step is taken in about twice that, and corrects what came before.
 const AHEAD: f64 = 0.2;
 /// Most speed that may be lacking after that time, of the centre of mass as of a turn at a leg's length, in units of √(g l)
-/// with l the length of the leg: 0.5 m/s for a leg of 0.9 m. Chosen: `docs/notebook/starts.md` has what lies above.
-const LACKING: f64 = 0.17;
+/// with l the length of the leg: 0.7 m/s for a leg of 0.9 m. Chosen: agents follow from many starts that lack 0.5 m/s, and from
+/// few that lack more (`docs/notebook/starts.md`).
+const LACKING: f64 = 0.24;
 
 impl Motion {
     /// Spans of time in which no body could start and follow, seconds from the first frame, in order.
