@@ -14,6 +14,11 @@ use serde::{Serialize, Serializer};
 /// Survival that is good enough: docs/results.md asks it of the hardest skills, and all skills there reach it.
 const SURVIVAL: f64 = 0.95;
 
+/// The measure of the episode from the first frame alone.
+const FROM_START: &str = "survival_from_start";
+/// Share of the starts that have to be within reach for the others to be excused. Chosen.
+const MOST: f64 = 0.5;
+
 /// What to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -52,9 +57,12 @@ pub struct Evaluation {
     pub measures: Vec<Measure>,
     /// The episodes that failed.
     pub failures: Vec<FailedEpisode>,
-    /// Starts, as shares of all possible ones, from which no body could do what is asked. They are performed and measured
-    /// like all others.
+    /// Starts, as shares of all possible ones, that are beyond reach: from there the reference asks for more force than the ground
+    /// can give. They are performed and measured like all others, but the verdict leaves them out if most starts are within
+    /// reach.
     pub beyond_reach: Vec<f64>,
+    /// Survival from the starts within reach; not a number if there are none.
+    pub survival_within_reach: f64,
     /// Whether these episodes show that the case is learned, as the task sees it.
     pub verdict: Verdict,
     /// One more episode, from standing still in the rest pose.
@@ -152,13 +160,13 @@ pub fn evaluate<A: Agent>(
         .map(|starts| perform(agent, starts, options.seconds))
         .collect();
     let episodes: Vec<Episode> = episodes?.into_iter().flatten().collect();
-    Ok(gather(agent.task().as_ref(), count, &episodes))
+    Ok(gather(agent.task().as_ref(), count, episodes))
 }
 
 /// Measures `episodes`: the first `count` are undisturbed, the next one starts from rest, the others are disturbed.
-fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
-    let (undisturbed, disturbed) = episodes.split_at(count + 1);
-    let (phases, rest) = undisturbed.split_at(count);
+fn gather(task: &dyn Task, count: usize, mut episodes: Vec<Episode>) -> Evaluation {
+    let mut rest = episodes.split_off(count);
+    let disturbed = rest.split_off(1);
     let more = |episodes: &[Episode]| {
         let measures = measures(task, episodes).into_iter();
         Disturbed {
@@ -167,11 +175,14 @@ fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
             failures: failures(episodes),
         }
     };
-    let beyond_reach: Vec<f64> = phases.iter().filter_map(|e| beyond(task, e)).collect();
-    let (mut measured, failed) = (measures(task, phases), failures(phases));
-    let judged = match beyond_reach.is_empty() || beyond_reach.len() == count {
-        true => measured.clone(),
-        false => judge_within_reach(task, phases, &mut measured),
+    let (mut measured, failed) = (measures(task, &episodes), failures(&episodes));
+    let beyond_reach: Vec<f64> = episodes.iter().filter_map(|e| beyond(task, e)).collect();
+    // Those within reach come first, in their order.
+    episodes.sort_by_key(|episode| beyond(task, episode).is_some());
+    let within = &episodes[..count - beyond_reach.len()];
+    let judged = match within.len() as f64 >= MOST * count as f64 {
+        true => judge(&mut measured, measures(task, within)),
+        false => measured.clone(),
     };
     let starts: Vec<f64> = failed.iter().map(|episode| episode.start).collect();
     let verdict = task.verdict(&Performance {
@@ -184,14 +195,18 @@ fn gather(task: &dyn Task, count: usize, episodes: &[Episode]) -> Evaluation {
         episodes: count,
         measures: measured,
         failures: failed,
+        survival_within_reach: match within {
+            [] => f64::NAN,
+            within => mean(within.iter().map(Episode::survival)),
+        },
         beyond_reach,
         verdict,
-        from_rest: more(rest),
-        perturbed: (!disturbed.is_empty()).then(|| more(disturbed)),
+        from_rest: more(&rest),
+        perturbed: (!disturbed.is_empty()).then(|| more(&disturbed)),
     }
 }
 
-/// Where an episode started, as a share of all possible starts, if no body could do what was asked there.
+/// Where an episode started, as a share of all possible starts, if that is beyond reach.
 fn beyond(task: &dyn Task, episode: &Episode) -> Option<f64> {
     match episode.start.state {
         StartState::Reference(start) => {
@@ -201,28 +216,17 @@ fn beyond(task: &dyn Task, episode: &Episode) -> Option<f64> {
     }
 }
 
-/// The same measures over the starts within reach, which have to be good enough; those over all starts needn't. The survival
-/// among them is put behind that from all starts.
-fn judge_within_reach(
-    task: &dyn Task,
-    phases: &[Episode],
-    measured: &mut Vec<Measure>,
-) -> Vec<Measure> {
-    let within = phases.iter().filter(|e| beyond(task, e).is_none());
-    let within: Vec<Episode> = within.cloned().collect();
-    let judged = measures(task, &within);
-    for (all, within) in measured.iter_mut().zip(&judged) {
-        if within.is_enough() && !all.is_enough() {
+/// What counts for the verdict: measures over all starts that are good enough, and for any other the same `within` reach. Where
+/// only the latter is good enough, the former needn't be. The first frame counts wherever it is.
+fn judge(measured: &mut [Measure], within: Vec<Measure>) -> Vec<Measure> {
+    let mut judged = within;
+    for (all, within) in measured.iter_mut().zip(&mut judged) {
+        if all.is_enough() || all.name == FROM_START {
+            *within = *all;
+        } else if within.is_enough() {
             all.enough = None;
         }
     }
-    let survival = Measure {
-        name: "survival_within_reach",
-        label: "survival, from starts within reach",
-        holds_disturbed: false,
-        ..judged[0]
-    };
-    measured.insert(1, survival);
     judged
 }
 
@@ -241,13 +245,9 @@ fn measures(task: &dyn Task, episodes: &[Episode]) -> Vec<Measure> {
             .good(Good::High, Unit::Share)
             .enough(SURVIVAL)
             .holding_disturbed(),
-        Measure::new(
-            "survival_from_start",
-            "survival, from the first frame",
-            first,
-        )
-        .good(Good::High, Unit::Share)
-        .enough(SURVIVAL),
+        Measure::new(FROM_START, "survival, from the first frame", first)
+            .good(Good::High, Unit::Share)
+            .enough(SURVIVAL),
     ];
     all.extend(task.measures(episodes));
     all.push(
@@ -277,6 +277,7 @@ impl Serialize for Evaluation {
         let mut map = serializer.serialize_map(None)?;
         fields(&mut map, self.episodes, &self.measures, &self.failures)?;
         map.serialize_entry("beyond_reach", &self.beyond_reach)?;
+        map.serialize_entry("survival_within_reach", &self.survival_within_reach)?;
         map.serialize_entry("learned", &self.verdict.learned)?;
         map.serialize_entry("verdict", &self.verdict.text)?;
         map.serialize_entry("from_rest", &self.from_rest)?;

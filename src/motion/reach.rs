@@ -1,8 +1,7 @@
-//! From which frames a body could follow a motion.
+//! From which frames a motion is beyond reach.
 //!
 //! Where no ground could give the motion its force and moment (see [`wrench`](super::wrench)), a body that starts in its
-//! state and does all it can is soon elsewhere: it lacks the momentum that the motion gains from nowhere. How much that
-//! is within the next moments says whether the start can be asked of anybody.
+//! state lacks the momentum that the motion gains from nowhere, however it moves. Little of that can be made up for.
 
 use super::Motion;
 use crate::clip::LoopMode;
@@ -12,15 +11,14 @@ use nalgebra::Vector3;
 /// Time that is looked ahead, s. Chosen: a step is taken in about twice that, and corrects what came before.
 const AHEAD: f64 = 0.2;
 /// Most speed that may be lacking after that time, of the centre of mass as of a turn at a leg's length, in units of √(g l)
-/// with l the length of the leg: 0.7 m/s for a leg of 0.9 m. Chosen: agents follow from many starts that lack 0.5 m/s, and from
-/// few that lack more (`docs/notebook/starts.md`).
+/// with l the length of the leg: 0.7 m/s for a leg of 0.9 m. Chosen (`docs/notebook/starts.md`).
 const LACKING: f64 = 0.24;
 
 impl Motion {
-    /// Spans of time in which no body could start and follow, seconds from the first frame, in order.
+    /// Spans of time from which the motion asks for more than the ground can give, seconds from the first frame, in order.
     ///
-    /// A frame is meant where, within [`AHEAD`], the residual force adds up to more than m v, or the residual moment about
-    /// the centre of mass to more than m l v, with m the mass, l the length of a leg and v = [`LACKING`] √(g l).
+    /// A frame belongs to them if the residual force of the next 0.2 s adds up to more than m v, or the residual moment about
+    /// the centre of mass to more than m l v, with m the mass, l the length of a leg and v = 0.24 √(g l).
     pub fn beyond_reach(&self, skeleton: &Skeleton) -> Vec<[f64; 2]> {
         let leg = skeleton.leg_length();
         let most = LACKING * (GRAVITY * leg).sqrt() * skeleton.total_mass();

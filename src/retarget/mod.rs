@@ -124,12 +124,8 @@ pub fn retarget_watched(
     };
     let fitted = fit.run(planted.goals);
     // All that the stages found, in their order.
-    let found = [placed.problem, closed.problem];
-    let problems = input
-        .problems
-        .iter()
-        .cloned()
-        .chain(found.into_iter().flatten());
+    let found = placed.problems.into_iter().chain(closed.problem);
+    let problems = input.problems.iter().cloned().chain(found);
     let outcome = Outcome {
         frames: fitted.frames,
         anchors: fitted.anchors,

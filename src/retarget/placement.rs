@@ -17,11 +17,13 @@ use super::goals::Goals;
 use super::limbs::HANDS;
 use super::model::Model;
 use super::pose::Posed;
+use super::rotation::heading;
+use super::seam::STRAIGHT;
 use super::setting::Setting;
 use super::source::Source;
-use crate::clip::Problem;
-use crate::humanoid::Slot;
+use crate::clip::{LoopMode, Problem};
 use ground::{Ground, Points};
+use nailed::Nailed;
 use nalgebra::Vector3;
 
 /// Goals and source on the ground.
@@ -32,15 +34,15 @@ pub(super) struct Placed {
     pub source: Source,
     /// When the source's feet and hands are on the ground.
     pub contacts: Vec<SourceContact>,
-    /// The warning `travel-restored` or `hips-restored`.
-    pub problem: Option<Problem>,
+    /// The warnings `travel-restored` and `hips-restored`.
+    pub problems: Vec<Problem>,
 }
 
 /// Puts goals and source on the ground.
 ///
 /// `first` is the frame in which the root is above the origin.
 pub(super) fn place(posed: Posed, model: &Model, setting: &Setting, first: usize) -> Placed {
-    let (posed, problem) = with_travel(posed, model, setting);
+    let (posed, problems) = with_travel(posed, model, setting);
     let ground = find_ground(&posed, model, setting);
     let contacts = posed.source.contacts(ground.floor, setting);
     let Posed { goals, source } = posed;
@@ -50,26 +52,63 @@ pub(super) fn place(posed: Posed, model: &Model, setting: &Setting, first: usize
         goals: swing::on_own_legs(posed.goals, setting.ankle, setting.leg),
         source: posed.source,
         contacts,
-        problem,
+        problems,
     }
 }
 
 /// Gives a clip that walks on the spot the travel that its sliding feet show, and one whose hips are nailed the way that they
-/// lost, with a warning.
-fn with_travel(posed: Posed, model: &Model, setting: &Setting) -> (Posed, Option<Problem>) {
-    if let Some(velocity) = travel::missing(&posed.goals, model, setting) {
-        // From the first frame on, so that the clip starts where it did.
-        let by = |f: usize| velocity * (f as f64 / setting.fps);
-        return (shifted(posed, by), Some(travel::problem(&velocity)));
+/// lost, with warnings.
+fn with_travel(posed: Posed, model: &Model, setting: &Setting) -> (Posed, Vec<Problem>) {
+    if nailed::is_nailed(&posed.source, setting.leg) {
+        return with_lost_way(posed, model, setting);
     }
-    let hips = posed.source.points.get(&Slot::Hips);
-    let points = ground_points(model, &posed.goals);
+    let travel = travel::missing(&posed.goals, model, setting, false);
+    let problems = travel.as_ref().map(travel::problem).into_iter().collect();
+    let by = travelled(travel.unwrap_or_default(), setting);
+    (shifted(posed, by), problems)
+}
+
+/// Gives nailed hips their way up and down, their travel, and the rest of their way over the ground.
+fn with_lost_way(posed: Posed, model: &Model, setting: &Setting) -> (Posed, Vec<Problem>) {
     let com = |qpos: &Vec<f64>| model.skeleton.com(&model.skeleton.forward(qpos));
     let com: Vec<_> = posed.goals.guess.iter().map(com).collect();
-    match hips.and_then(|hips| nailed::way(hips, &com, &points, setting)) {
-        Some(way) => (shifted(posed, |f| way[f]), Some(nailed::problem(&way))),
-        None => (posed, None),
+    let points = ground_points(model, &posed.goals);
+    let nailed = Nailed {
+        com: &com,
+        points: &points,
+        repeats: repeats(&posed.goals, setting),
+        setting,
+    };
+    let down = nailed.down(lift(&posed, setting).unwrap_or(0.0));
+    let as_it_is = travel::missing(&posed.goals, model, setting, false);
+    let posed = shifted(posed, |f| down[f]);
+    // Feet may slide only once they have come down.
+    let travel = as_it_is.or_else(|| travel::missing(&posed.goals, model, setting, true));
+    let mut problems: Vec<Problem> = travel.as_ref().map(travel::problem).into_iter().collect();
+    let travel = travel.unwrap_or_default();
+    let mut way = nailed.over_ground(&travel);
+    if !nailed::is_seen(&way, setting.leg) {
+        way.fill(Vector3::zeros());
     }
+    let whole: Vec<_> = way.iter().zip(&down).map(|(a, b)| a + b).collect();
+    if nailed::is_seen(&whole, setting.leg) {
+        problems.push(nailed::problem(&whole));
+    }
+    let travelled = travelled(travel, setting);
+    (shifted(posed, |f| way[f] + travelled(f)), problems)
+}
+
+/// Whether the clip's cycles all go in the same direction.
+fn repeats(goals: &Goals, setting: &Setting) -> bool {
+    let last = goals.frames() - 1;
+    let turn = goals.root_rotation(last) * goals.root_rotation(0).inverse();
+    setting.loop_mode == LoopMode::Wrap && heading(&turn).abs() < STRAIGHT
+}
+
+/// Where this travel, m/s, leads by each frame, metres: from the first frame on, so that the clip starts where it did.
+fn travelled(travel: Vector3<f64>, setting: &Setting) -> impl Fn(usize) -> Vector3<f64> {
+    let fps = setting.fps;
+    move |f| travel * (f as f64 / fps)
 }
 
 /// Goals and source with every frame shifted, metres.
@@ -87,10 +126,14 @@ fn shifted(posed: Posed, by: impl Fn(usize) -> Vector3<f64>) -> Posed {
 
 /// Finds the ground under the goals.
 fn find_ground(posed: &Posed, model: &Model, setting: &Setting) -> Ground {
-    // Ankles are at the source's height, so soles differ by how much higher its ankles are above its soles.
-    let lift = posed.source.ankle.map(|height| height - setting.ankle);
     let points = ground_points(model, &posed.goals);
-    ground::find(&points, lift, setting)
+    ground::find(&points, lift(posed, setting), setting)
+}
+
+/// How much higher than the source's soles the skeleton's are, metres, where the source's rest pose tells: ankles are at the
+/// source's height, so soles differ by how much higher its ankles are above its soles.
+fn lift(posed: &Posed, setting: &Setting) -> Option<f64> {
+    posed.source.ankle.map(|height| height - setting.ankle)
 }
 
 /// The lowest points of the feet as their goals turn them, and of the whole body as guessed.

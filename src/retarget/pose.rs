@@ -212,8 +212,11 @@ impl<'a> Builder<'a> {
                 continue;
             };
             let shoulder = shoulders.and_then(|s| Some(s[ARMS.iter().position(|a| a == limb)?]));
-            if let Some((place, k)) = shoulder.zip(keypoint(limb[0])) {
-                (joint, points[k]) = (place, place);
+            if let Some(place) = shoulder {
+                joint = place;
+                if let Some(k) = keypoint(limb[0]) {
+                    points[k] = place;
+                }
             }
             for pair in limb.windows(2) {
                 let Some(bone) = self.bone(source, pair[0], pair[1]) else {

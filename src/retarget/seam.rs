@@ -17,7 +17,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 /// Turn of a cycle below which it goes straight, radians: 1°. Chosen: a recorded gait that is meant to be straight turns by
 /// less.
-const STRAIGHT: f64 = 0.0175;
+pub(super) const STRAIGHT: f64 = 0.0175;
 /// Gap of a joint above which the user gets a warning, radians: 6°. Chosen.
 const NOTICEABLE: f64 = 0.1;
 /// Time on either side of the seam over which the gap is faded, s. Chosen.

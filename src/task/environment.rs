@@ -50,7 +50,8 @@ pub trait Task: Send + Sync {
     /// Where episodes start before anything was learned.
     fn starts(&self) -> StartDistribution;
 
-    /// Whether no body could do what a case asks of one that starts at this share of all its starts.
+    /// Whether this start of a case, as a share of all its starts, is beyond reach: the ground can't give the force that is asked
+    /// for from there.
     fn is_beyond_reach(&self, case: usize, share: f64) -> bool;
 
     /// What an agent can be asked to perform; at least one case.

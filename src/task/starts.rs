@@ -26,12 +26,12 @@ pub struct Span {
     pub last_start: f64,
     /// Whether it goes on with its first frame after its last.
     pub wraps: bool,
-    /// Parts of it, seconds, in order, in which no body could start and follow.
+    /// Parts of it from which the ground can't give what is asked, seconds, in order.
     pub beyond_reach: Vec<[f64; 2]>,
 }
 
 impl Span {
-    /// The share of a part of it, seconds, from which a body could follow.
+    /// The share of a part of it, seconds, that is within reach.
     fn within_reach(&self, from: f64, length: f64) -> f64 {
         let beyond = |[begin, end]: &[f64; 2]| (end.min(from + length) - begin.max(from)).max(0.0);
         let beyond: f64 = self.beyond_reach.iter().map(beyond).sum();
@@ -55,7 +55,7 @@ struct Bin {
     /// Seconds, as are the rest.
     from: f64,
     length: f64,
-    /// Share of it from which a body could follow.
+    /// Share of it that is within reach.
     within_reach: f64,
     /// Bins that a start here goes through within [`AHEAD`], with the time spent in each.
     ahead: Vec<(usize, f64)>,
@@ -81,7 +81,7 @@ impl Tally {
 }
 
 /// Draws where episodes begin. A share of them begins where failure is likely, in proportion to the failures within a
-/// second of such a start, unless no body could follow from there; all others begin in any motion, and anywhere in it. A long
+/// second of such a start and to the share of it that is within reach; all others begin in any motion, and anywhere in it. A long
 /// motion counts like a short one.
 #[derive(Clone, Debug)]
 pub struct StartDistribution {
@@ -219,11 +219,11 @@ impl StartDistribution {
             let reach = start_range(&self.motions[bin.motion].0);
             bin.length / (reach * self.motions.len() as f64)
         };
-        // What fails from where no body could follow is no failure to be mended by more of it.
+        // More practice can't mend failures from starts beyond reach.
         let likely = |bin: &Bin| even(bin) * expected(bin) * bin.within_reach;
         let likely: Vec<f64> = self.bins.iter().map(likely).collect();
         let all: f64 = likely.iter().sum();
-        // Nothing has failed yet: all starts are even.
+        // Nothing within reach has failed yet: all starts are even.
         let share = if all > 0.0 { self.share } else { 0.0 };
         let mut sum = 0.0;
         self.cumulative.clear();
@@ -329,7 +329,7 @@ mod tests {
         assert!(moments.iter().all(|p| p.time <= 6.0));
     }
 
-    /// Where no body could follow, failures lead to no more starts; even ones remain.
+    /// Failures beyond reach lead to no more starts; even ones remain.
     #[test]
     fn what_is_beyond_reach_is_no_goal() {
         let spans = [Span {

@@ -7,11 +7,11 @@ use super::episode::Measure;
 pub struct Performance<'a> {
     /// How many episodes were performed, from starts spread evenly over all.
     pub episodes: usize,
-    /// What was measured over all of them, or where some starts are beyond reach, over all others.
+    /// What was measured over all of them, or over those within reach where that is good enough.
     pub measures: &'a [Measure],
     /// The starts of those that failed, as shares of all possible starts.
     pub failed: &'a [f64],
-    /// The starts from which no body could do what was asked, likewise.
+    /// The starts that are beyond reach, likewise.
     pub beyond_reach: &'a [f64],
 }
 

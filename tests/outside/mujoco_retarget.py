@@ -240,9 +240,12 @@ def measure(rig, clip, motion):
     errors = [np.linalg.norm(at[s] - hips - p, axis=1) for s, p in wanted.items()]
     path = middle(source, "left-upper-leg", "right-upper-leg") * scale
     away = hips - path
-    restored = any(p["id"] in ("travel-restored", "hips-restored") for p in moved["report"]["problems"])
-    # Hips that never move have no way to compare with.
-    nailed = "hips" in source and np.ptp(source["hips"] * scale, axis=0).max() < NAILED_M
+    ids = [p["id"] for p in moved["report"]["problems"]]
+    # Hips that never move have no way to compare with, and only they may get one.
+    nailed = "hips-restored" in ids
+    if nailed and np.ptp(source["hips"] * scale, axis=0).max() > NAILED_M:
+        sys.exit(f"{motion}: the hips move, but got another way")
+    restored = nailed or "travel-restored" in ids
     if restored and not nailed:
         time = np.arange(count)[:, None] / max(count - 1, 1)
         away = away - time * (away[-1] - away[0])

@@ -33,6 +33,9 @@ The result is a table:
                      somersault
   normalised return  reward, as a share of the most that can be had
   from rest          one more episode, which starts from standing still
+  beyond reach       start phases from which the reference asks for more force
+                     than the ground can give; a motion may be learned without
+                     them
   missed             beside a value that is not good enough; with one such value, the
                      motion is not yet learned
 A dash stands for what has no value, such as the error of a momentum that is zero.
@@ -226,6 +229,11 @@ fn table(result: &CaseEvaluation) -> String {
     let row = |m: &Measure| Row(m.label.to_owned(), value(m, m.value), good(m));
     let mut rows = vec![Row(heading, String::new(), "good".to_owned())];
     rows.extend(found.measures.iter().map(row));
+    if !found.beyond_reach.is_empty() {
+        let survival = found.survival_within_reach;
+        let measure = Measure::new("", "survival, from starts within reach", survival);
+        rows.push(row(&measure.good(Good::High, Unit::Share)));
+    }
     let rest = ("from rest", &found.from_rest);
     let disturbed = found.perturbed.iter().map(|p| ("disturbed", p));
     for (how, more) in std::iter::once(rest).chain(disturbed) {
@@ -239,7 +247,7 @@ fn table(result: &CaseEvaluation) -> String {
     let perturbed = found.perturbed.iter();
     let perturbed = perturbed.filter_map(|p| failed(&p.failures, ", disturbed"));
     rows.extend(failed(&found.failures, "").into_iter().chain(perturbed));
-    rows.extend(phases("out of reach from phase", &found.beyond_reach));
+    rows.extend(phases("start phases beyond reach", &found.beyond_reach));
     let line = |(number, Row(name, value, good)): (usize, &Row)| {
         let indent = if number == 0 { "" } else { "  " };
         let width = 40 - indent.len();

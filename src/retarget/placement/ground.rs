@@ -113,7 +113,7 @@ fn low(points: &[Vec<Vector3<f64>>]) -> f64 {
 }
 
 /// Height of the lowest of these points, metres.
-fn bottom(points: &[Vector3<f64>]) -> f64 {
+pub(super) fn bottom(points: &[Vector3<f64>]) -> f64 {
     points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
 }
 

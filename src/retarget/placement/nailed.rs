@@ -5,109 +5,144 @@
 //! off it: the body moves down until its lowest point is on the ground, and over the ground so that what is down stands
 //! still. A flight can't be read off, and becomes a crouch.
 
-use super::ground::Points;
-use crate::clip::{LoopMode, Problem};
+use super::ground::{Points, bottom};
+use crate::clip::Problem;
+use crate::humanoid::Slot;
+use crate::retarget::limbs::LEGS;
 use crate::retarget::setting::Setting;
+use crate::retarget::source::Source;
 use crate::retarget::way::Way;
 use nalgebra::{Vector2, Vector3};
 
-/// Farthest that hips are from their mean while they are nailed, leg lengths. Chosen: rounding in files is below it, and no
+/// Farthest that hips are from where they begin while they are nailed, leg lengths. Chosen: rounding in files is below it, and no
 /// recorded person stands as still.
 const NAILED: f64 = 1e-3;
-/// Least that the lowest point rises or slides in such a clip, leg lengths. Chosen; a body that only waves its arms has lost
-/// nothing.
+/// Farthest that such hips are from the middle of the hip joints, leg lengths: a root on the ground, which rigs without hips have,
+/// is farther. Chosen.
+const IN_THE_BODY: f64 = 0.5;
+/// Shortest way that is worth a warning, leg lengths, and shortest over the ground that is taken at all. Chosen; a body that only
+/// waves its arms has lost nothing.
 const MOVES: f64 = 0.05;
 /// Heights over which a point counts less and less as one that carries, leg lengths. Chosen.
 const DOWN: f64 = 0.015;
-/// Time after which the way forgets where it was, s, so that small slides don't add up. Chosen.
-const HELD: f64 = 5.0;
+/// Time after which the way forgets where it was, s: small slides don't add up, and part of a take goes the way that it goes in
+/// the whole. Chosen well below the time that a clip keeps around its part.
+const HELD: f64 = 0.5;
 /// Speed from which on a point that is down counts the less the faster it slides, leg lengths per second. Chosen.
 const SLOW: f64 = 0.1;
-/// Hardest sideways acceleration of the centre of mass that the ground is asked for, m/s². Chosen: that of a brisk
-/// step, for a quarter of gravity needs the centre of mass well beside the feet.
+/// Hardest sideways acceleration of the centre of mass that the ground is asked for, m/s². Chosen.
 const HARDEST: f64 = 1.5;
-/// Time that weighs what is beyond it beside slides, s: 2.5 m/s² too much counts like a slide of 1 m/s. Chosen; with half of it,
-/// KayKit's two-handed spin survived 91 instead of 94 % of the time.
+/// Time that weighs what is beyond it beside slides, s: 2.5 m/s² too much counts like a slide of 1 m/s. Chosen
+/// (`docs/notebook/nailed-hips.md`).
 const YIELDS: f64 = 0.4;
 /// How often the accelerations are brought down to it. Chosen.
 const GOES: usize = 4;
 /// Standard deviation of the window that smooths the way, s: a step from one foot to the other takes about as long. Chosen.
 const SMOOTHED: f64 = 0.05;
 
-/// How every frame is shifted, metres; `None` for a clip whose hips move, or whose feet stand. `hips` and `com` are the places of
-/// hips and centre of mass.
-pub(super) fn way(
-    hips: &[Vector3<f64>],
-    com: &[Vector3<f64>],
-    points: &Points,
-    setting: &Setting,
-) -> Option<Vec<Vector3<f64>>> {
-    let Setting { fps, leg, .. } = *setting;
-    let first = hips.first()?;
-    let is_nailed = hips.iter().all(|p| (p - first).norm() <= NAILED * leg);
-    if !is_nailed || points.all.iter().any(Vec::is_empty) {
-        return None;
-    }
-    let repeats = setting.loop_mode == LoopMode::Wrap;
-    let mut way = over_ground(com, points, setting);
-    let lowest: Vec<f64> = points.all.iter().map(|frame| bottom(frame)).collect();
-    let ground = lowest.iter().copied().fold(f64::INFINITY, f64::min);
-    let down: Vec<f64> = lowest.iter().map(|low| ground - low).collect();
-    let down = smoothed(&down, SMOOTHED * fps, repeats);
-    way.iter_mut().zip(down).for_each(|(place, z)| place.z = z);
-    let moves = way.iter().any(|place| place.norm() > MOVES * leg);
-    moves.then_some(way)
+/// A clip whose hips are nailed.
+pub(super) struct Nailed<'a> {
+    /// Places of the centre of mass, world, metres.
+    pub com: &'a [Vector3<f64>],
+    /// Lowest points of all bodies.
+    pub points: &'a Points,
+    /// Whether the last frame is the first of a cycle that goes on in the same direction.
+    pub repeats: bool,
+    /// Rate and sizes.
+    pub setting: &'a Setting,
 }
 
-/// The way over the ground on which what is down slides little, and the ground can push the centre of mass as the way asks.
-fn over_ground(com: &[Vector3<f64>], points: &Points, setting: &Setting) -> Vec<Vector3<f64>> {
-    let fps = setting.fps;
-    let repeats = setting.loop_mode == LoopMode::Wrap && com.len() > 1;
-    // The last frame of a cycle is its first.
-    let own = if repeats { com.len() - 1 } else { com.len() };
-    let wraps = |f: usize| if repeats { f % own } else { f.min(own - 1) };
-    let pair = |f: usize| [wraps(f), wraps(f + 1)].map(|i| &points.all[i]);
-    let speeds: Vec<_> = (0..own).map(|f| -slide(pair(f), setting) * fps).collect();
-    let acceleration = |at: &dyn Fn(usize) -> Vector2<f64>, f: usize| {
-        let before = if repeats {
-            f + own - 1
-        } else {
-            f.saturating_sub(1)
-        };
-        let [a, b, c] = [before, f, f + 1].map(|i| at(wraps(i)));
-        (a - b * 2.0 + c) * (fps * fps)
+/// Whether the source's hips never move, and are hips.
+pub(super) fn is_nailed(source: &Source, leg: f64) -> bool {
+    let Some(hips) = source.points.get(&Slot::Hips).filter(|hips| hips.len() > 1) else {
+        return false;
     };
-    let own_push = |f: usize| acceleration(&|i| com[i].xy(), f);
-    let way = |yields: f64, pushes: &[Vector2<f64>]| {
-        let way = Way {
-            repeats,
-            fps,
-            stay: HELD.powi(-2),
-            follow: 1.0,
-            push: yields * yields,
-        };
-        way.solve(&speeds, pushes)
+    let joints = |f: usize| LEGS.map(|limb| source.at(limb[0], f));
+    let is_hips = |f: usize| match joints(f) {
+        [Some(left), Some(right)] => (hips[f] - (left + right) / 2.0).norm() <= IN_THE_BODY * leg,
+        _ => false,
     };
-    // First nearly as the feet say; then, where the ground can't push like that, as hard as it can.
-    let least: Vec<_> = (0..own).map(|f| -own_push(f)).collect();
-    let mut found = way(SMOOTHED, &least);
-    for _ in 0..GOES {
-        let push = |f: usize| {
-            let wanted = acceleration(&|i| found[i] + com[i].xy(), f);
-            wanted * (HARDEST / wanted.norm().max(HARDEST)) - own_push(f)
-        };
-        let pushes: Vec<_> = (0..own).map(push).collect();
-        found = way(YIELDS, &pushes);
-    }
-    (0..com.len()).map(|f| found[wraps(f)].push(0.0)).collect()
+    let is_there = |f: usize| (hips[f] - hips[0]).norm() <= NAILED * leg;
+    (0..hips.len()).all(|f| is_there(f) && is_hips(f))
 }
 
-/// The note `hips-restored`.
+/// Whether a way is long enough to be told.
+pub(super) fn is_seen(way: &[Vector3<f64>], leg: f64) -> bool {
+    way.iter().any(|place| place.norm() > MOVES * leg)
+}
+
+impl Nailed<'_> {
+    /// The way up and down, metres, that puts the lowest point to where soles of a body that stands are, at this height.
+    pub fn down(&self, ground: f64) -> Vec<Vector3<f64>> {
+        // A body without shapes stands on nothing.
+        let by = |frame: &Vec<Vector3<f64>>| match bottom(frame) {
+            low if low.is_finite() => ground - low,
+            _ => 0.0,
+        };
+        let by: Vec<f64> = self.points.all.iter().map(by).collect();
+        let by = smoothed(&by, SMOOTHED * self.setting.fps, self.repeats);
+        by.into_iter().map(|z| Vector3::z() * z).collect()
+    }
+
+    /// The way over the ground beside this travel, m/s, on which what is down slides little, and the ground can push the centre of
+    /// mass as the way asks; metres.
+    pub fn over_ground(&self, travel: &Vector3<f64>) -> Vec<Vector3<f64>> {
+        let fps = self.setting.fps;
+        let last = self.com.len() - 1;
+        // The last frame of a cycle is its first.
+        let own = if self.repeats { last } else { last + 1 };
+        let slides = |f: usize| {
+            let pair = [f, (f + 1).min(last)].map(|i| &self.points.all[i]);
+            -slide(pair, self.setting) * fps - travel.xy()
+        };
+        let speeds: Vec<_> = (0..own).map(slides).collect();
+        let own_push = |f: usize| self.acceleration(f, own, &|i| self.com[i].xy());
+        let way = |yields: f64, pushes: &[Vector2<f64>]| {
+            let way = Way {
+                repeats: self.repeats,
+                fps,
+                stay: HELD.powi(-2),
+                follow: 1.0,
+                push: yields * yields,
+            };
+            way.solve(&speeds, pushes)
+        };
+        // First nearly as the feet say; then, where the ground can't push like that, as hard as it can.
+        let least: Vec<_> = (0..own).map(|f| -own_push(f)).collect();
+        let mut found = way(SMOOTHED, &least);
+        for _ in 0..GOES {
+            let push = |f: usize| {
+                let wanted = self.acceleration(f, own, &|i| found[i] + self.com[i].xy());
+                wanted * (HARDEST / wanted.norm().max(HARDEST)) - own_push(f)
+            };
+            let pushes: Vec<_> = (0..own).map(push).collect();
+            found = way(YIELDS, &pushes);
+        }
+        (0..=last).map(|f| found[f % own].push(0.0)).collect()
+    }
+
+    /// Second difference of places at frame `f` of `own` different ones, m/s²; an end that doesn't repeat is its own neighbour.
+    fn acceleration(
+        &self,
+        f: usize,
+        own: usize,
+        at: &dyn Fn(usize) -> Vector2<f64>,
+    ) -> Vector2<f64> {
+        let [before, after] = match self.repeats {
+            true => [(f + own - 1) % own, (f + 1) % own],
+            false => [f.saturating_sub(1), (f + 1).min(own - 1)],
+        };
+        (at(before) - at(f) * 2.0 + at(after)) * self.setting.fps.powi(2)
+    }
+}
+
+/// The warning `hips-restored`.
 pub(super) fn problem(way: &[Vector3<f64>]) -> Problem {
     let farthest = |size: &dyn Fn(&Vector3<f64>) -> f64| way.iter().map(size).fold(0.0, f64::max);
     let message = format!(
-        "the hips don't move in this clip, so their way was read off what stands on the ground: up to {:.0} cm up and \
-         down and {:.0} cm over the ground",
+        "the hips stay at one point in this clip, so their path was estimated from what touches the ground: up to {:.0} cm \
+         up or down and {:.0} cm sideways; jumps can't be seen and become crouches, so export the clip with the motion of its \
+         hips if you can",
         farthest(&|p| p.z.abs()) * 100.0,
         farthest(&|p| p.xy().norm()) * 100.0
     );
@@ -128,11 +163,6 @@ fn slide(pair: [&Vec<Vector3<f64>>; 2], setting: &Setting) -> Vector2<f64> {
         weights += weight;
     }
     sum / f64::max(weights, f64::MIN_POSITIVE)
-}
-
-/// Height of the lowest of these points, metres.
-fn bottom(points: &[Vector3<f64>]) -> f64 {
-    points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
 }
 
 /// A path smoothed by a Gaussian window of this standard deviation, frames. Beyond its ends a cycle goes on, and any other path

@@ -20,6 +20,8 @@ const STRAYS: f64 = 0.25;
 const DOWN: f64 = 0.04;
 /// Slowest travel that is restored, leg lengths per second. A slower slide is a flaw of the clip.
 const SLOWEST: f64 = 0.4;
+/// The same for a gait whose hips are nailed, which must have lost its travel.
+const SLOWEST_NAILED: f64 = 0.15;
 /// How near to the median velocity one has to be to agree with it, relative to it …
 const AGREES: f64 = 0.5;
 /// … and the share of the frames with a foot down that have to agree.
@@ -28,8 +30,14 @@ const MAJORITY: f64 = 0.6;
 /// slide. One in this many frames.
 const ALTERNATES: usize = 5;
 
-/// The velocity that a clip on the spot lacks, m/s, if its feet slide steadily while they are down.
-pub(super) fn missing(goals: &Goals, model: &Model, setting: &Setting) -> Option<Vector3<f64>> {
+/// The velocity that a clip on the spot lacks, m/s, if its feet slide steadily while they are down. Of a clip whose hips are
+/// nailed, slower slides are believed as well, if it is a gait.
+pub(super) fn missing(
+    goals: &Goals,
+    model: &Model,
+    setting: &Setting,
+    is_nailed: bool,
+) -> Option<Vector3<f64>> {
     let Setting {
         fps,
         leg,
@@ -45,10 +53,15 @@ pub(super) fn missing(goals: &Goals, model: &Model, setting: &Setting) -> Option
     }
     let soles = soles(model, goals);
     // A cycle on the spot is a gait. A clip that ends may be a single slide, so both feet have to take turns.
-    if loop_mode == LoopMode::Clamp && !alternate(&soles) {
+    let is_gait = alternate(&soles);
+    if loop_mode == LoopMode::Clamp && !is_gait {
         return None;
     }
-    Some(-sliding(&soles, fps, leg)?)
+    let slowest = match is_nailed && is_gait {
+        true => SLOWEST_NAILED,
+        false => SLOWEST,
+    };
+    Some(-sliding(&soles, fps, leg, slowest)?)
 }
 
 /// The warning `travel-restored`.
@@ -74,7 +87,7 @@ fn alternate(soles: &[Vec<Vector3<f64>>]) -> bool {
 
 /// Velocity at which feet slide while they are down, m/s; `None` if they slide slowly or unsteadily. The median finds what most
 /// frames agree on, and those frames' mean is the result.
-fn sliding(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64) -> Option<Vector3<f64>> {
+fn sliding(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64, slowest: f64) -> Option<Vector3<f64>> {
     let lowest = |points: &[Vector3<f64>]| {
         (0..points.len()).min_by(|a, b| points[*a].z.total_cmp(&points[*b].z))
     };
@@ -94,7 +107,7 @@ fn sliding(soles: &[Vec<Vector3<f64>>], fps: f64, leg: f64) -> Option<Vector3<f6
     }
     let middle = Vector3::new(median(&velocities, 0)?, median(&velocities, 1)?, 0.0);
     let speed = middle.norm();
-    if speed < SLOWEST * leg {
+    if speed < slowest * leg {
         return None;
     }
     // Frames in which a foot comes down or leaves slide otherwise; most have to agree.

@@ -74,3 +74,30 @@ fn who_stands_still_isnt_nailed() {
             .all(|p| p.id != "hips-restored")
     );
 }
+
+/// Part of a take goes the way that it goes in the whole.
+#[test]
+fn part_of_a_nailed_take_goes_the_same_way() {
+    let clip = Clip {
+        loop_mode: LoopMode::Clamp,
+        ..nailed(&ours("kick.fbx"))
+    };
+    // Long enough that its end is beyond what a part keeps of it.
+    let mut long = clip.clone();
+    for _ in 0..3 {
+        long.frames.extend_from_slice(&clip.frames);
+    }
+    let whole = on_humanoid(&long).motion;
+    let (from, to) = (clip.frames.len() + 12, clip.frames.len() + 60);
+    let part = long.trim(from as f64 / long.fps, to as f64 / long.fps);
+    let part = on_humanoid(&part.unwrap_or_else(|e| panic!("{e}"))).motion;
+    let whole = Motion {
+        bodies: whole.bodies[from..=to].to_vec(),
+        ..whole
+    };
+    let [over_ground, height] = apart(&whole, &part);
+    assert!(
+        over_ground < 0.002 && height < 0.002,
+        "{over_ground} {height}"
+    );
+}

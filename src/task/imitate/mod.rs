@@ -163,9 +163,9 @@ impl Task for Imitate {
     }
 
     fn is_beyond_reach(&self, case: usize, share: f64) -> bool {
-        let last = |r: &Arc<Reference>| r.last_start(self.settings.physics.control_dt());
+        let control_dt = self.settings.physics.control_dt();
         let reference = self.references.get(case);
-        reference.is_some_and(|r| r.is_beyond_reach(share * last(r)))
+        reference.is_some_and(|r| r.is_beyond_reach(share, control_dt))
     }
 
     fn cases(&self) -> &[Case] {

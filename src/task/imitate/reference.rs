@@ -118,8 +118,9 @@ impl Reference {
         }
     }
 
-    /// Whether no body could start at `time`, seconds of the first cycle, and follow.
-    pub fn is_beyond_reach(&self, time: f64) -> bool {
+    /// Whether a start at this share of all starts is beyond reach.
+    pub fn is_beyond_reach(&self, share: f64, control_dt: f64) -> bool {
+        let time = share * self.last_start(control_dt);
         let mut spans = self.beyond_reach.iter();
         spans.any(|[from, to]| (*from..*to).contains(&time))
     }

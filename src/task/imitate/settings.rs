@@ -242,7 +242,8 @@ pub struct ImitationSettings {
     /// Whether episodes begin at any phase (reference state initialisation) instead of at the first frame alone.
     pub start_anywhere: bool,
     /// Share of the episodes that begin where failure is likely; the others begin in any motion, and anywhere in it if
-    /// `task.start_anywhere`.
+    /// `task.start_anywhere`. Failures from starts beyond reach, where the reference asks for more force than the ground can give,
+    /// don't count here.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub adaptive_starts: f64,
     /// Time from the start of an episode to its first transition into another motion of the run, and from each to the next: the

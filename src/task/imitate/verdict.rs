@@ -32,29 +32,39 @@ fn missed(found: &Performance) -> Option<String> {
             "it lasts and keeps the pose, but is {:.0} mm away from where it should be",
             value("mpjpe_global_mm")
         ),
-        _ => format!("it fails from {}", phases(found.failed)),
+        _ => match counting(found).0 {
+            counting if counting.is_empty() => format!("it fails from {}", phases(found.failed)),
+            counting => format!("it fails from {}", phases(&counting)),
+        },
     })
 }
 
 /// How well it is learned.
 fn learned(found: &Performance) -> String {
     let turning = found.measure("angular_momentum_error");
-    let is_beyond = |start: &&f64| found.beyond_reach.contains(start);
-    if !found.failed.is_empty() && found.failed.iter().all(|start| is_beyond(&start)) {
-        let all = found.episodes - found.failed.len();
+    let (counting, excused) = counting(found);
+    if counting.is_empty() && !excused.is_empty() {
+        let all = found.episodes - found.beyond_reach.len();
+        let verb = if excused.len() == 1 { "is" } else { "are" };
         return format!(
-            "learned: it lasts from {all} start phases; from {} no body could follow",
-            phases(found.failed)
+            "learned: it lasts from all {all} start phases within reach; {} {verb} beyond reach",
+            phases(&excused)
         );
     }
-    match found.failed {
+    match counting[..] {
         // Whoever stands performs such a motion, trained or not.
         [] if turning.is_some_and(|error| error.value.is_nan()) => {
             "learned, but nothing turns in this motion, so there was little to learn".to_owned()
         }
         [] => format!("learned: it lasts from all {} start phases", found.episodes),
-        failed => format!("learned, but it fails from {}", phases(failed)),
+        _ => format!("learned, but it fails from {}", phases(&counting)),
     }
+}
+
+/// The starts that failed: those that count, and those that are beyond reach.
+fn counting(found: &Performance) -> (Vec<f64>, Vec<f64>) {
+    let counts = |start: &f64| !found.beyond_reach.contains(start);
+    found.failed.iter().partition(|start| counts(start))
 }
 
 /// The first few phases, and how many more there are.

@@ -42,10 +42,10 @@ fn a_verdict_says_what_is_wrong() {
     assert!(beyond.learned);
     assert_eq!(
         beyond.text,
-        "learned: it lasts from 30 start phases; from phases 0.25, 0.28 no body could follow"
+        "learned: it lasts from all 30 start phases within reach; phases 0.25, 0.28 are beyond reach"
     );
     let more = of(0.96, 20.0, &[0.25, 0.5]);
-    assert_eq!(more.text, "learned, but it fails from phases 0.25, 0.50");
+    assert_eq!(more.text, "learned, but it fails from phase 0.50");
     let loose = of(1.0, 83.4, &[]);
     assert!(
         !loose.learned && loose.text == "not yet learned: it lasts, but its bodies are 83 mm off"
