@@ -293,3 +293,38 @@ impl Serialize for Disturbed {
         map.end()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn survival(name: &'static str, value: f64) -> Measure {
+        let measure = Measure::new(name, "survival", value);
+        measure.good(Good::High, Unit::Share).enough(SURVIVAL)
+    }
+
+    /// What is beyond reach excuses, but not the first frame; and nothing is judged worse without it.
+    #[test]
+    fn starts_beyond_reach_excuse() {
+        let mut measured = [
+            survival("survival", 0.9),
+            survival(FROM_START, 0.5),
+            survival("success", 0.96),
+            survival("other", 0.8),
+        ];
+        let within = vec![
+            survival("survival", 0.97),
+            survival(FROM_START, 1.0),
+            survival("success", 0.94),
+            survival("other", 0.9),
+        ];
+        let judged = judge(&mut measured, within);
+        let passes: Vec<bool> = judged.iter().map(Measure::is_enough).collect();
+        assert_eq!(passes, [true, false, true, false]);
+        let values: Vec<f64> = judged.iter().map(|m| m.value).collect();
+        assert_eq!(values, [0.97, 0.5, 0.96, 0.9]);
+        // The table marks what is missed, and excuses what isn't.
+        let bounds: Vec<bool> = measured.iter().map(|m| m.enough.is_some()).collect();
+        assert_eq!(bounds, [false, true, true, true]);
+    }
+}

@@ -237,6 +237,39 @@ fn who_is_dragged_cannot_be_followed() {
     assert!(motion.beyond_reach(&s).is_empty());
 }
 
+/// A body that falls freely, whose turn about Z suddenly goes on three times as fast: nothing in the air gives that.
+#[test]
+fn a_spin_that_changes_in_the_air_cannot_be_followed() {
+    let s = humanoid();
+    let mut qpos = vec![s.rest_qpos(); 60];
+    for (f, q) in qpos.iter_mut().enumerate() {
+        let t = f as f64 / 60.0;
+        q[2] += 5.0 + 3.0 * t - 0.5 * GRAVITY * t * t;
+        let angle = 4.0 * t + 8.0 * (t - 0.5).max(0.0);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        q[3..7].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+    }
+    let changes = Motion::from_poses(&s, draft(&s, qpos.clone(), 60.0)).beyond_reach(&s);
+    assert!(
+        changes.is_empty(),
+        "8 rad/s about the long axis are little: {changes:?}"
+    );
+    for (f, q) in qpos.iter_mut().enumerate() {
+        let t = f as f64 / 60.0;
+        let angle = 4.0 * t + 8.0 * (t - 0.5).max(0.0);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
+        q[3..7].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+    }
+    let changes = Motion::from_poses(&s, draft(&s, qpos, 60.0)).beyond_reach(&s);
+    let [[from, to]] = changes[..] else {
+        panic!("{changes:?}");
+    };
+    assert!(
+        (0.25..0.4).contains(&from) && (0.45..0.6).contains(&to),
+        "{changes:?}"
+    );
+}
+
 #[test]
 fn free_fall_needs_nothing() {
     let s = humanoid();
