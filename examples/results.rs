@@ -59,6 +59,23 @@ const TABLES: &[Table] = &[
         ],
     },
     Table {
+        file: "whole-body",
+        rows: &[
+            ("skill", "skill"),
+            ("samples", "samples"),
+            ("processor", "cpu"),
+        ],
+        columns: &[
+            ("survival asked", "asked.survival"),
+            ("survival", "survival"),
+            ("from the first frame", "survival_from_first_frame"),
+            ("from starts within reach", "survival_within_reach"),
+            ("local error asked, mm", "asked.mpjpe_local_mm"),
+            ("local error, mm", "mpjpe_local_mm"),
+            ("normalised return", "normalized_return"),
+        ],
+    },
+    Table {
         file: "several-clips",
         rows: &[("clip", "clip")],
         columns: &[

@@ -232,7 +232,8 @@ fn table(result: &CaseEvaluation) -> String {
     if !found.beyond_reach.is_empty() {
         let survival = found.survival_within_reach;
         let measure = Measure::new("", "survival, from starts within reach", survival);
-        rows.push(row(&measure.good(Good::High, Unit::Share)));
+        // Behind the heading and the survival from all starts.
+        rows.insert(2, row(&measure.good(Good::High, Unit::Share)));
     }
     let rest = ("from rest", &found.from_rest);
     let disturbed = found.perturbed.iter().map(|p| ("disturbed", p));
