@@ -66,9 +66,10 @@ pub(super) fn is_nailed(source: &Source, leg: f64) -> bool {
     (0..hips.len()).all(|f| is_there(f) && is_hips(f))
 }
 
-/// Whether a way is long enough to be told.
+/// Whether a way leads far enough from where it begins to be told.
 pub(super) fn is_seen(way: &[Vector3<f64>], leg: f64) -> bool {
-    way.iter().any(|place| place.norm() > MOVES * leg)
+    let leads = |first: &Vector3<f64>| way.iter().any(|place| (place - first).norm() > MOVES * leg);
+    way.first().is_some_and(leads)
 }
 
 impl Nailed<'_> {
@@ -138,7 +139,9 @@ impl Nailed<'_> {
 
 /// The warning `hips-restored`.
 pub(super) fn problem(way: &[Vector3<f64>]) -> Problem {
-    let farthest = |size: &dyn Fn(&Vector3<f64>) -> f64| way.iter().map(size).fold(0.0, f64::max);
+    let from_first = way.iter().map(|place| place - way[0]);
+    let farthest =
+        |size: &dyn Fn(Vector3<f64>) -> f64| from_first.clone().map(size).fold(0.0, f64::max);
     let message = format!(
         "the hips stay at one point in this clip, so their path was estimated from what touches the ground: up to {:.0} cm \
          up or down and {:.0} cm sideways; jumps can't be seen and become crouches, so export the clip with the motion of its \
