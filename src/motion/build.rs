@@ -8,8 +8,8 @@ use crate::clip::LoopMode;
 use crate::skeleton::Skeleton;
 use nalgebra::Vector3;
 
-/// Height of a body's lowest point up to which it touches the ground, leg lengths. Chosen: 1 cm with legs of 0.87 m.
-pub(crate) const TOUCHING: f64 = 0.0115;
+/// Height of a body's lowest point up to which it touches the ground, leg lengths. Chosen: just below 1 cm with legs of 0.87 m.
+pub(crate) const TOUCHING: f64 = 0.0114;
 
 /// What a motion is made from: coordinates and what they don't say themselves.
 #[derive(Clone, Debug, PartialEq)]
