@@ -211,6 +211,7 @@ const TABLES: &[Table] = &[
             ("feet that should stand, mean", "foot_speed_cm_s cm/s"),
             ("depth asked", "asked.depth_cm cm"),
             ("deepest point", "depth_cm cm"),
+            ("highest in contact", "float_in_contact_cm cm"),
             ("coordinates out of range", "outside_range"),
         ],
     },

@@ -73,47 +73,48 @@ impl Normal {
     fn solve(self) -> Vec<Vector2<f64>> {
         let count = self.rows.len();
         let inner = count - 2;
-        // Each column of B couples its frame to the two on either side.
-        let border = |f: usize| {
-            let [last, end] = [self.row_between(f, inner), self.row_between(f, inner + 1)];
-            Vector2::new(last, end)
-        };
-        let near = [0, 1, inner - 2, inner - 1];
+        // r beside the two columns of B, whose entries are where a frame is near the border; the shortest way's are all near.
         let mut right: Vec<Vector4<f64>> = self.right[..inner]
             .iter()
             .map(|r| Vector4::new(r.x, r.y, 0.0, 0.0))
             .collect();
-        for f in near {
-            let columns = border(f);
-            (right[f].z, right[f].w) = (columns.x, columns.y);
+        let is_near = |f: &usize| *f < 2 || *f + 2 >= inner;
+        let near: Vec<usize> = (0..inner).filter(is_near).collect();
+        for &f in &near {
+            let [z, w] = self.border(f);
+            (right[f].z, right[f].w) = (z, w);
         }
         solve_band(&mut self.rows[..inner].to_vec(), &mut right);
-        let (mut block, mut rest) = (Matrix2::zeros(), [self.right[inner], self.right[inner + 1]]);
-        for i in 0..2 {
-            for k in 0..2 {
-                block[(i, k)] = self.row_between(inner + i, inner + k);
-            }
-        }
-        let mut seen = vec![false; inner];
-        for f in near {
-            // In the shortest ways a frame is near both ends.
-            if std::mem::replace(&mut seen[f], true) {
-                continue;
-            }
-            let columns = border(f);
+        let Some(ends) = self.ends(&near, &right) else {
+            return vec![Vector2::zeros(); count];
+        };
+        let place = |r: &Vector4<f64>| r.xy() - ends[0] * r.z - ends[1] * r.w;
+        right.iter().map(place).chain(ends).collect()
+    }
+
+    /// What couples a frame to the last two.
+    fn border(&self, f: usize) -> [f64; 2] {
+        let count = self.rows.len();
+        [count - 2, count - 1].map(|end| self.row_between(f, end))
+    }
+
+    /// The places y of the last two frames. `solved` has A⁻¹ r and A⁻¹ B, and B isn't zero at the frames `near`.
+    fn ends(&self, near: &[usize], solved: &[Vector4<f64>]) -> Option<[Vector2<f64>; 2]> {
+        let inner = solved.len();
+        let own = [self.border(inner), self.border(inner + 1)];
+        let mut block = Matrix2::from_fn(|i, k| own[i][k]);
+        let mut rest = [self.right[inner], self.right[inner + 1]];
+        for &f in near {
+            let columns = self.border(f);
             for i in 0..2 {
-                rest[i] -= right[f].xy() * columns[i];
+                rest[i] -= solved[f].xy() * columns[i];
                 for k in 0..2 {
-                    block[(i, k)] -= columns[i] * right[f][2 + k];
+                    block[(i, k)] -= columns[i] * solved[f][2 + k];
                 }
             }
         }
-        let Some(inverse) = block.try_inverse() else {
-            return vec![Vector2::zeros(); count];
-        };
-        let ends = [0, 1].map(|i| rest[0] * inverse[(i, 0)] + rest[1] * inverse[(i, 1)]);
-        let place = |r: &Vector4<f64>| r.xy() - ends[0] * r.z - ends[1] * r.w;
-        right.iter().map(place).chain(ends).collect()
+        let inverse = block.try_inverse()?;
+        Some([0, 1].map(|i| rest[0] * inverse[(i, 0)] + rest[1] * inverse[(i, 1)]))
     }
 
     /// What couples two frames.
