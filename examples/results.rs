@@ -25,14 +25,17 @@ struct Table {
     columns: &'static [(&'static str, &'static str)],
 }
 
+/// Runs of one skill with as many samples on one processor share a row.
+const SKILLS: &[(&str, &str)] = &[
+    ("skill", "skill"),
+    ("samples", "samples"),
+    ("processor", "cpu"),
+];
+
 const TABLES: &[Table] = &[
     Table {
         file: "skills",
-        rows: &[
-            ("skill", "skill"),
-            ("samples", "samples"),
-            ("processor", "cpu"),
-        ],
+        rows: SKILLS,
         columns: &[
             ("survival asked", "asked.survival"),
             ("survival", "survival"),
@@ -60,11 +63,7 @@ const TABLES: &[Table] = &[
     },
     Table {
         file: "whole-body",
-        rows: &[
-            ("skill", "skill"),
-            ("samples", "samples"),
-            ("processor", "cpu"),
-        ],
+        rows: SKILLS,
         columns: &[
             ("survival asked", "asked.survival"),
             ("survival", "survival"),

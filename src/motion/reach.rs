@@ -84,3 +84,61 @@ impl Motion {
         about_com.collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{draft, humanoid};
+    use super::*;
+    use nalgebra::{Unit, UnitQuaternion};
+
+    /// A body that stands and is dragged over the ground at 30 m/s² for a tenth of a second: 3 m/s that no ground gives. What leads to
+    /// it is beyond reach, what follows isn't.
+    #[test]
+    fn who_is_dragged_cannot_be_followed() {
+        let s = humanoid();
+        let mut qpos = vec![s.rest_qpos(); 121];
+        for (f, q) in qpos.iter_mut().enumerate() {
+            let t = (f as f64 / 60.0 - 1.0).clamp(0.0, 0.1);
+            let after = (f as f64 / 60.0 - 1.1).max(0.0);
+            q[0] += 15.0 * t * t + 3.0 * after;
+        }
+        let motion = Motion::from_poses(&s, draft(&s, qpos, 60.0));
+        let spans = motion.beyond_reach(&s);
+        let [[from, to]] = spans[..] else {
+            panic!("{spans:?}");
+        };
+        assert!(
+            (0.75..0.9).contains(&from) && (1.0..1.15).contains(&to),
+            "{spans:?}"
+        );
+
+        let still = vec![s.rest_qpos(); 121];
+        let motion = Motion::from_poses(&s, draft(&s, still, 60.0));
+        assert!(motion.beyond_reach(&s).is_empty());
+    }
+
+    /// A body that falls freely and turns about `axis` at 4 rad/s, then, from half a second on, at 12.
+    fn faster(axis: Unit<Vector3<f64>>) -> Vec<[f64; 2]> {
+        let s = humanoid();
+        let mut qpos = vec![s.rest_qpos(); 60];
+        for (f, q) in qpos.iter_mut().enumerate() {
+            let t = f as f64 / 60.0;
+            q[2] += 5.0 + 3.0 * t - 0.5 * GRAVITY * t * t;
+            let angle = 4.0 * t + 8.0 * (t - 0.5).max(0.0);
+            let turn = UnitQuaternion::from_axis_angle(&axis, angle);
+            q[3..7].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+        }
+        Motion::from_poses(&s, draft(&s, qpos, 60.0)).beyond_reach(&s)
+    }
+
+    /// Nothing in the air gives a somersault more spin. About the long axis the same takes little momentum.
+    #[test]
+    fn a_spin_that_changes_in_the_air_cannot_be_followed() {
+        let twist = faster(Vector3::z_axis());
+        assert!(twist.is_empty(), "{twist:?}");
+        let [[from, to]] = faster(Vector3::y_axis())[..] else {
+            panic!("one span is expected");
+        };
+        assert!((0.25..0.4).contains(&from) && (0.45..0.6).contains(&to));
+    }
+}
