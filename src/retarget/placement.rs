@@ -80,7 +80,7 @@ fn with_lost_way(posed: Posed, model: &Model, setting: &Setting) -> (Posed, Vec<
         setting,
     };
     let down = nailed.down(lift(&posed, setting).unwrap_or(0.0));
-    let as_it_is = travel::missing(&posed.goals, model, setting, false);
+    let as_it_is = travel::missing(&posed.goals, model, setting, true);
     let posed = shifted(posed, |f| down[f]);
     // Feet may slide only once they have come down.
     let travel = as_it_is.or_else(|| travel::missing(&posed.goals, model, setting, true));

@@ -52,12 +52,14 @@ pub(super) fn missing(
         return None;
     }
     let soles = soles(model, goals);
-    // A cycle on the spot is a gait. A clip that ends may be a single slide, so both feet have to take turns.
+    // A cycle on the spot is a gait. A clip that ends may be a single slide, and so may a blow whose hips are nailed: there both
+    // feet have to take turns.
     let is_gait = alternate(&soles);
-    if loop_mode == LoopMode::Clamp && !is_gait {
+    let may_be_a_slide = loop_mode == LoopMode::Clamp || is_nailed;
+    if may_be_a_slide && !is_gait {
         return None;
     }
-    let slowest = match is_nailed && is_gait {
+    let slowest = match is_nailed {
         true => SLOWEST_NAILED,
         false => SLOWEST,
     };
