@@ -71,7 +71,7 @@ impl Default for Plan {
             round: 20,
             samples: 4_000_000,
             final_std: 0.4,
-            final_learning_rate: 0.3,
+            final_learning_rate: 0.2,
         }
     }
 }

@@ -29,6 +29,10 @@ const MAJORITY: f64 = 0.6;
 /// Share of the frames in which each foot is the lower one at least, if the clip doesn't repeat: a gait, and not a single
 /// slide. One in this many frames.
 const ALTERNATES: usize = 5;
+/// How often the lower foot changes at least in a gait whose hips are nailed, among frames in which the feet's heights differ by
+/// more than this, leg lengths. All gaits of the clips at hand change it twice or more, blows and sitting down at most once.
+const CHANGES: usize = 2;
+const LEVEL: f64 = 0.02;
 
 /// The velocity that a clip on the spot lacks, m/s, if its feet slide steadily while they are down. Of a clip whose hips are
 /// nailed, slower slides are believed as well, if it is a gait.
@@ -54,7 +58,8 @@ pub(super) fn missing(
     let soles = soles(model, goals);
     // A cycle on the spot is a gait. A clip that ends may be a single slide, and so may a blow whose hips are nailed: there both
     // feet have to take turns.
-    let is_gait = alternate(&soles);
+    // A step, and sitting down, changes the lower foot once.
+    let is_gait = alternate(&soles) && (!is_nailed || changes(&soles, leg, loop_mode) >= CHANGES);
     let may_be_a_slide = loop_mode == LoopMode::Clamp || is_nailed;
     if may_be_a_slide && !is_gait {
         return None;
@@ -75,16 +80,30 @@ pub(super) fn problem(velocity: &Vector3<f64>) -> Problem {
     Problem::warning("travel-restored", message)
 }
 
-/// Whether each foot is the lower one in many frames. Each frame has the left foot's points in its first half.
+/// Whether each foot is the lower one in many frames.
 fn alternate(soles: &[Vec<Vector3<f64>>]) -> bool {
-    let lowest = |points: &[Vector3<f64>]| points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
-    let left = |frame: &Vec<Vector3<f64>>| {
-        let (left, right) = frame.split_at(frame.len() / 2);
-        lowest(left) < lowest(right)
-    };
-    let count = soles.iter().filter(|frame| left(frame)).count();
+    let left = |frame: &&Vec<Vector3<f64>>| left_above_right(frame) < 0.0;
+    let count = soles.iter().filter(left).count();
     let least = soles.len() / ALTERNATES;
     (least..=soles.len() - least).contains(&count) && least > 0
+}
+
+/// How often the lower foot changes, among frames in which one is clearly lower.
+fn changes(soles: &[Vec<Vector3<f64>>], leg: f64, loop_mode: LoopMode) -> usize {
+    let higher = soles.iter().map(|frame| left_above_right(frame));
+    let clear = higher.filter(|by| by.abs() > LEVEL * leg);
+    let lower: Vec<bool> = clear.map(|by| by < 0.0).collect();
+    let changes = lower.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    // The cycle goes on with its first frame.
+    let over_seam = loop_mode == LoopMode::Wrap && lower.first() != lower.last();
+    changes + usize::from(over_seam)
+}
+
+/// How much higher the left foot is than the right one, metres. The left foot's points are in the frame's first half.
+fn left_above_right(frame: &[Vector3<f64>]) -> f64 {
+    let lowest = |points: &[Vector3<f64>]| points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let (left, right) = frame.split_at(frame.len() / 2);
+    lowest(left) - lowest(right)
 }
 
 /// Velocity at which feet slide while they are down, m/s; `None` if they slide slowly or unsteadily. The median finds what most
@@ -127,4 +146,26 @@ fn median(vectors: &[Vector3<f64>], axis: usize) -> Option<f64> {
     let mut values: Vec<f64> = vectors.iter().map(|v| v[axis]).collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames in which the left foot is so much higher than the right one, metres.
+    fn soles(left_above: &[f64]) -> Vec<Vec<Vector3<f64>>> {
+        let frame = |by: &f64| vec![Vector3::z() * *by, Vector3::zeros()];
+        left_above.iter().map(frame).collect()
+    }
+
+    #[test]
+    fn a_step_changes_the_lower_foot_once_and_a_gait_again_and_again() {
+        let changes = |heights: &[f64], mode| changes(&soles(heights), 1.0, mode);
+        let step = [0.1, 0.1, 0.01, -0.01, -0.1, -0.1];
+        assert_eq!(changes(&step, LoopMode::Clamp), 1);
+        // A walk that repeats, cut where the feet change.
+        assert_eq!(changes(&step, LoopMode::Wrap), 2);
+        // Feet that are nearly level change nothing.
+        assert_eq!(changes(&[0.01, -0.01, 0.01, -0.01], LoopMode::Wrap), 0);
+    }
 }
