@@ -6,9 +6,11 @@ use crate::locate;
 use crate::printer::Printer;
 use crate::progress;
 use crate::recording::Recording;
-use mimic::evaluate::{Agent, EvaluateError, Options, perform, perform_sequence};
+use mimic::evaluate::{
+    Agent, EvaluateError, Options, SteeringEvaluation, SteeringOptions, perform, perform_sequence,
+};
 use mimic::run::{CaseEvaluation, Claim, Controller, Run, files};
-use mimic::task::{Episode, EpisodeStart, Perturbations};
+use mimic::task::{Episode, EpisodeStart, Perturbations, TaskSettings};
 use std::path::Path;
 
 /// Opens the run that `wanted` means. Left out, the newest run.
@@ -31,6 +33,22 @@ pub fn claim(name: &str) -> Outcome<Claim> {
             claim => return Ok(claim?),
         }
     }
+}
+
+/// Whether a run is steered by a player.
+pub fn is_steered(run: &Run) -> bool {
+    matches!(run.plan().task, TaskSettings::Steer(_))
+}
+
+/// Evaluates how a run is steered.
+pub fn evaluate_steering(
+    run: &Run,
+    options: &SteeringOptions,
+    printer: &Printer,
+) -> Outcome<SteeringEvaluation> {
+    let what = format!("evaluating {}", run.dir().display());
+    let found = progress::during(printer, &what, |_| run.evaluate_steering(options));
+    Ok(found?)
 }
 
 /// Evaluates every motion of a run.

@@ -1,7 +1,7 @@
 //! Authors the clips of `clips/` and writes them:
 //!
 //! ```text
-//! cargo run --release --example author_clips             # writes clips/kick.fbx and clips/walk.glb
+//! cargo run --release --example author_clips             # writes all clips
 //! cargo run --release --example author_clips -- --check  # only says whether they are as committed
 //! ```
 
@@ -10,6 +10,7 @@ mod fbx;
 mod fbx_tree;
 mod figure;
 mod glb;
+mod idle;
 mod kick;
 mod rig;
 mod spline;
@@ -35,7 +36,14 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         &walk,
         &walk::zmp(&body, &rig, &walk, 1.0 / walk::FPS),
     );
+    let idle = idle::poses(&rig);
+    let still: Vec<Ground> = idle
+        .iter()
+        .map(|pose| ground(body.com(&rig, pose)))
+        .collect();
+    report(&rig, &body, "idle", &idle, &still);
     let files = [
+        ("idle.glb", glb::document(&rig, &idle, idle::FPS, "idle")),
         ("kick.fbx", fbx::document(&rig, &kick, "kick")?),
         ("walk.glb", glb::document(&rig, &walk, walk::FPS, "walk")),
     ];

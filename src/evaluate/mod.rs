@@ -3,8 +3,12 @@
 mod agent;
 mod episode;
 mod evaluation;
+mod steering;
 
 pub use agent::{Agent, EvaluateError};
 pub(crate) use episode::longest;
 pub use episode::{perform, perform_sequence};
 pub use evaluation::{Disturbed, Evaluation, FailedEpisode, Options, evaluate};
+pub use steering::{
+    Figures, Pushed, Spread, SteeringEvaluation, SteeringOptions, Turn, evaluate_steering,
+};

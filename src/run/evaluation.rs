@@ -3,7 +3,10 @@
 use super::error::RunError;
 use super::files;
 use super::folder::Run;
-use crate::evaluate::{Agent, EvaluateError, Evaluation, Options, evaluate};
+use crate::evaluate::{
+    Agent, EvaluateError, Evaluation, Options, SteeringEvaluation, SteeringOptions, evaluate,
+    evaluate_steering,
+};
 use crate::task::Case;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -42,6 +45,30 @@ impl Run {
             })
         };
         cases.map(one).collect()
+    }
+
+    /// Evaluates the saved policy of a run that is steered.
+    ///
+    /// # Errors
+    /// A run without a policy, or a broken one.
+    pub fn evaluate_steering(
+        &self,
+        options: &SteeringOptions,
+    ) -> Result<SteeringEvaluation, RunError> {
+        let controller = self.controller()?;
+        let policy = self.dir().join(files::POLICY);
+        evaluate_steering(&controller, options).map_err(|error| match error {
+            EvaluateError::Learn(_) => RunError::in_file(&policy)(error),
+            _ => error.into(),
+        })
+    }
+
+    /// Keeps an evaluation of how the run is steered, in `eval.json`.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn keep_steering(&self, found: &SteeringEvaluation) -> Result<(), RunError> {
+        self.write(files::EVALUATION, &format!("{:#}\n", json!(found)))
     }
 
     /// Keeps an evaluation as that of the run, in `eval.json`.

@@ -8,6 +8,7 @@ use super::episode::{Episode, Frame, Measure};
 use super::error::TaskError;
 use super::model::CharacterModel;
 use super::starts::{Moment, StartDistribution};
+use super::steer::Wish;
 use super::step::{Block, Case, EpisodeStart, Input, Purpose, ReferenceState, Step};
 use super::verdict::{Performance, Verdict};
 use crate::sim::{Diverged, Target, World};
@@ -114,6 +115,9 @@ pub trait Environment: Send {
 
     /// Whether the transition that an [`Input::Case`] asked for hasn't begun yet.
     fn is_changing(&self) -> bool;
+
+    /// What a player asks for now, where there is one.
+    fn wish(&self) -> Option<Wish>;
 
     /// What the agent should be like now, where the task has a reference.
     fn reference(&self) -> Option<ReferenceState>;

@@ -52,6 +52,12 @@ pub enum TaskError {
     },
     /// No motion at all.
     NoMotion,
+    /// A wish for a character that performs motions.
+    NotSteered,
+    /// No motion in which a steered character could stand.
+    NoStanding,
+    /// No motion with which a steered character could walk.
+    NoGait,
     /// A case that the task doesn't have.
     NoSuchCase {
         /// Its number, from 0.
@@ -119,6 +125,14 @@ impl Explain for TaskError {
             .remedy("train them apart"),
             Self::NoMotion => Explanation::input("there is no motion to learn")
                 .remedy("give at least one motion"),
+            Self::NotSteered => Explanation::input("a character that performs motions can't be steered")
+                .remedy("train one with `--task steer`"),
+            Self::NoStanding => Explanation::input("no motion stands still, so the character couldn't stop")
+                .remedy("add a motion that stands, such as an idle"),
+            Self::NoGait => Explanation::input(
+                "no motion walks on and on, so the character couldn't go anywhere",
+            )
+            .remedy("add a walk or a run that repeats"),
             Self::NoSuchCase { number, cases } => {
                 Explanation::input(format!("there is no motion number {number}"))
                     .remedy(format!("give a number from 0 to {}", cases.saturating_sub(1)))

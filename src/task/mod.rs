@@ -13,6 +13,7 @@ mod imitate;
 mod model;
 mod settings;
 mod starts;
+mod steer;
 mod step;
 mod verdict;
 
@@ -30,6 +31,7 @@ pub use imitate::{
 pub use model::{CharacterModel, SolePoint};
 pub use settings::{TASKS, TaskSettings};
 pub use starts::{Moment, Span, StartDistribution, Tally};
+pub use steer::{InputSettings, Role, Steer, SteerSettings, Traits, Wish};
 pub use step::{
     Block, Case, EpisodeStart, Failure, Input, MAX_TERMS, Outcome, Purpose, ReferenceState,
     StartState, Step, TermValues, size,

@@ -2,6 +2,7 @@
 
 use super::disturbance::Perturbations;
 use super::dynamics::Dynamics;
+use super::steer::Wish;
 use crate::sim::LinkState;
 use arrayvec::ArrayVec;
 use nalgebra::{Isometry3, Vector3};
@@ -88,6 +89,8 @@ pub enum StartState {
 pub enum Input {
     /// Begin the transition into the case of this number at the best moment of the next second.
     Case(usize),
+    /// Go and face this way from now on.
+    Wish(Wish),
     /// Shove the trunk at the beginning of the next control step: an impulse in world axes, N·s.
     Push(Vector3<f32>),
 }

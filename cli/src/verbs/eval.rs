@@ -1,5 +1,7 @@
 //! `mimic eval`: measures how well an agent performs what it learned.
 
+pub mod steering;
+
 use crate::args::{Replace, at_least_one};
 use crate::failure::{Failure, Outcome};
 use crate::locate;
@@ -8,10 +10,11 @@ use crate::printer::Printer;
 use crate::runs;
 use crate::shell;
 use crate::verbs::train::program;
-use mimic::evaluate::{FailedEpisode, Options};
+use mimic::evaluate::{FailedEpisode, Options, SteeringOptions};
 use mimic::explain::plain;
 use mimic::run::{CaseEvaluation, Run, RunError};
 use mimic::task::{Good, Measure, Unit};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -38,6 +41,9 @@ The result is a table:
                      them
   missed             beside a value that is not good enough; with one such value, the
                      motion is not yet learned
+A run that is steered (`--task steer`) is measured in episodes of a minute of random input instead, with pushes and \
+without, and in starts and turns; the animated character that it follows stands beside it.
+
 A dash stands for what has no value, such as the error of a momentum that is zero.
 
 The run's own eval.json is written only with the default number of episodes and seconds, so that \
@@ -100,6 +106,9 @@ impl Args {
             .as_deref()
             .map(|out| place(out, &run, self.replace.force))
             .transpose()?;
+        if runs::is_steered(&run) {
+            return self.steering(run, out, printer);
+        }
         // Held from before the policy is read: the evaluation that is kept has to be that of the policy beside it.
         let held = match out {
             None if is_usual(&options) => Some(run.hold()),
@@ -119,6 +128,38 @@ impl Args {
             Ok(()) => printer.result(&report, shown),
             Err(failure) => printer.partial_result(report, shown, failure),
         }
+    }
+}
+
+/// The figures of a run that is steered.
+impl Args {
+    fn steering(&self, mut run: Run, out: Option<Output>, printer: &Printer) -> Outcome {
+        let options = SteeringOptions {
+            episodes: self.episodes,
+            ..SteeringOptions::default()
+        };
+        let held = match out {
+            None if options == SteeringOptions::default() => Some(run.hold()),
+            _ => None,
+        };
+        let found = runs::evaluate_steering(&run, &options, printer)?;
+        let report = json!(found);
+        match (out, held) {
+            (Some(out), _) => out.write_text(&format!("{report:#}\n"))?,
+            (None, Some(held)) => {
+                if let Err(error) = held.and_then(|()| run.keep_steering(&found)) {
+                    printer.warn(format!(
+                        "the evaluation is not kept: {error}, or write it elsewhere with `--out FILE`"
+                    ));
+                }
+            }
+            (None, None) => printer.note(
+                "the run's eval.json stays as it is, because the options differ from the default; `--out FILE` writes a file",
+            ),
+        }
+        let folder = run.dir().display().to_string();
+        let name = plain(&folder);
+        printer.result(&report, || format!("{name}\n{}", steering::table(&found)))
     }
 }
 

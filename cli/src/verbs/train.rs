@@ -5,6 +5,7 @@ mod finish;
 mod preset;
 mod progress;
 mod resume;
+mod roles;
 mod setting;
 mod stop;
 
@@ -19,7 +20,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use clock::Clock;
 use finish::Stopped;
 use mimic::run::{Claim, Plan, Run, RunError, Session, files};
-use mimic::task::{CharacterModel, TASKS, TaskError};
+use mimic::task::{CharacterModel, TASKS, TaskError, TaskSettings};
 use preset::Preset;
 use progress::Progress;
 pub use resume::program;
@@ -186,6 +187,9 @@ impl Args {
         if let Some(file) = &self.retarget.skeleton {
             let model = CharacterModel::new(skeleton.clone());
             model.map_err(|e| Failure::in_file(Path::new(file), e))?;
+        }
+        if matches!(preset.plan.task, TaskSettings::Steer(_)) {
+            roles::say(&preparations, &motions, &skeleton, printer);
         }
         let run = claim.create(preset.plan.clone(), skeleton, motions);
         run.map_err(|e| preset.failure(e))

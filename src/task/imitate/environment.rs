@@ -16,6 +16,7 @@ use crate::task::environment::{Draws, Environment};
 use crate::task::error::TaskError;
 use crate::task::model::CharacterModel;
 use crate::task::starts::{Moment, uniform};
+use crate::task::steer::Wish;
 use crate::task::step::{EpisodeStart, Failure, Input, Outcome, Purpose, ReferenceState, Step};
 use nalgebra::Vector3;
 use rand_chacha::rand_core::Rng;
@@ -314,6 +315,7 @@ impl Environment for Imitation {
                 self.note_arrival();
             }
             Input::Push(impulse) => self.asked_push = Some(impulse),
+            Input::Wish(_) => return Err(TaskError::NotSteered),
         }
         Ok(())
     }
@@ -413,6 +415,10 @@ impl Environment for Imitation {
 
     fn is_changing(&self) -> bool {
         self.playback.is_leading()
+    }
+
+    fn wish(&self) -> Option<Wish> {
+        None
     }
 
     fn reference(&self) -> Option<ReferenceState> {

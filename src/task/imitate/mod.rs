@@ -22,11 +22,20 @@ mod touch;
 mod transition;
 mod verdict;
 
+pub(super) use aim::aim;
+pub(super) use measures::measures;
 pub use observe::{ObservationInputs, layout, observation_size, observe};
+pub(super) use observe::{
+    Writer, agent, agent_layout, ahead_layout, error_layout, errors, further_ahead,
+};
 pub use placement::Placement;
+pub(super) use placement::{anchor, heading};
 pub use reference::Reference;
+pub(super) use reward::terms;
 pub use reward::{Kernels, TERM_NAMES, Terms};
 pub use settings::{Actions, ImitationSettings, Observations, Rewards, Terminations};
+pub(super) use terminate::failure;
+pub(super) use verdict::verdict;
 
 use super::environment::{Environment, Task};
 use super::episode::{Episode, Measure};
@@ -185,10 +194,10 @@ impl Task for Imitate {
         let largest = |e: &Episode| self.references[e.start.case].largest_momentum();
         let largest_momentum = episodes.iter().map(largest).fold(0.0, f32::max);
         let contacts = &self.references[0].contacts_of_motion;
-        measures::measures(&self.model, contacts, largest_momentum, episodes)
+        measures(&self.model, contacts, largest_momentum, episodes)
     }
 
     fn verdict(&self, found: &Performance) -> Verdict {
-        verdict::verdict(found)
+        verdict(found)
     }
 }

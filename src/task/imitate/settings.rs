@@ -160,7 +160,7 @@ impl Rewards {
 
     /// A weight for a term that the kernels don't have would only make every reward smaller, and rewards are divided by the
     /// sum of the weights.
-    fn check(&self) -> Result<(), TaskError> {
+    pub(in crate::task) fn check(&self) -> Result<(), TaskError> {
         let weights = self.weights().into_iter().zip(self.kernels.has());
         match TERM_NAMES
             .iter()

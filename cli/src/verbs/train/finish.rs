@@ -9,7 +9,7 @@ use crate::runs;
 use crate::shell;
 use crate::verbs::eval;
 use crate::viewer::{self, Viewer};
-use mimic::evaluate::Options;
+use mimic::evaluate::{Options, SteeringOptions};
 use mimic::explain::plain;
 use mimic::run::{CaseEvaluation, Iteration, PRESETS, Plan, Run, Session, files};
 use mimic::task::{EpisodeStart, StartState};
@@ -36,6 +36,9 @@ pub enum Stopped {
 /// Evaluates and records what was learned.
 pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome {
     let run = session.run();
+    if runs::is_steered(run) {
+        return finish_steering(session, stopped, printer);
+    }
     let options = options(run);
     let results = runs::evaluate(run, &options, printer)?;
     run.keep_evaluation(&results)?;
@@ -53,6 +56,23 @@ pub fn finish(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome
     let advice = Some(more.join("; ")).filter(|advice| !advice.is_empty());
     let table = eval::text(&results, advice.as_deref());
     printer.text(&format!("{folder}\n{table}{look}"))
+}
+
+/// The same of a run that is steered.
+fn finish_steering(session: &Session, stopped: Stopped, printer: &Printer) -> Outcome {
+    let run = session.run();
+    let found = runs::evaluate_steering(run, &SteeringOptions::default(), printer)?;
+    run.keep_steering(&found)?;
+    let recorded = record(run, printer)?;
+    if printer.is_json() {
+        return last_line(run.dir(), stopped, json!(found), printer);
+    }
+    let folder = plain(&run.dir().display().to_string());
+    let look = recorded.map_or_else(String::new, |file| how_to_look(run.dir(), &file));
+    printer.text(&format!(
+        "{folder}\n{}{look}",
+        eval::steering::table(&found)
+    ))
 }
 
 /// Ends a session that was interrupted, and that nothing more is to be said of.

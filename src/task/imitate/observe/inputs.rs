@@ -23,7 +23,7 @@ pub struct ObservationInputs<'a> {
 }
 
 /// Writes values one after the other.
-pub(super) struct Writer<'a> {
+pub(in crate::task) struct Writer<'a> {
     out: &'a mut [f32],
     at: usize,
 }

@@ -6,14 +6,24 @@ use crate::task::model::CharacterModel;
 use crate::task::step::ReferenceState;
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// A name and how many numbers it stands for.
+type Named = (&'static str, usize);
+
 /// The blocks of an observation that sees `ahead` moments of the reference beyond the next control step.
-pub(super) fn layout(
-    model: &CharacterModel,
-    contacts: usize,
-    ahead: usize,
-) -> Vec<(&'static str, usize)> {
+pub(super) fn layout(model: &CharacterModel, contacts: usize, ahead: usize) -> Vec<Named> {
+    let mut blocks = agent_layout(model, contacts);
+    blocks.extend(error_layout(model, contacts));
+    blocks.push(("phase", 5));
+    for _ in 0..ahead {
+        blocks.extend(ahead_layout(model, contacts));
+    }
+    blocks
+}
+
+/// The blocks that [`agent`] writes.
+pub(in crate::task) fn agent_layout(model: &CharacterModel, contacts: usize) -> Vec<Named> {
     let dof = model.character.dof;
-    let mut blocks = vec![
+    vec![
         ("root_height", 1),
         ("up", 3),
         ("root_velocity", 3),
@@ -25,6 +35,13 @@ pub(super) fn layout(
         ("com_velocity", 3),
         ("angular_momentum", 3),
         ("contact", contacts),
+    ]
+}
+
+/// The blocks that [`errors`] writes.
+pub(in crate::task) fn error_layout(model: &CharacterModel, contacts: usize) -> Vec<Named> {
+    let dof = model.character.dof;
+    vec![
         ("joint_rotation_error", dof),
         ("joint_velocity_error", dof),
         ("root_position_error", 3),
@@ -32,17 +49,17 @@ pub(super) fn layout(
         ("root_velocity_error", 3),
         ("root_angular_velocity_error", 3),
         ("reference_contact", contacts),
-        ("phase", 5),
-    ];
-    for _ in 0..ahead {
-        blocks.extend([
-            ("ahead_root_position", 3),
-            ("ahead_root_rotation", 3),
-            ("ahead_joint_rotation", dof),
-            ("ahead_contact", contacts),
-        ]);
-    }
-    blocks
+    ]
+}
+
+/// The blocks that [`further_ahead`] writes.
+pub(in crate::task) fn ahead_layout(model: &CharacterModel, contacts: usize) -> Vec<Named> {
+    vec![
+        ("ahead_root_position", 3),
+        ("ahead_root_rotation", 3),
+        ("ahead_joint_rotation", model.character.dof),
+        ("ahead_contact", contacts),
+    ]
 }
 
 /// The agent, its errors against the reference at the next control step, the phase, and the reference further ahead; all in the
@@ -57,7 +74,7 @@ pub(super) fn observe(model: &CharacterModel, scene: &ObservationInputs, w: &mut
 }
 
 /// The agent as it is: height and tilt of the root, speeds, joints, head, hands and feet, the whole body, and contacts.
-fn agent(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
+pub(in crate::task) fn agent(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
     let (links, dynamics) = (scene.links, scene.dynamics);
     let root = &links[0];
     let into_root = |v: Vector3<f32>| root.pose.rotation.inverse_transform_vector(&v);
@@ -79,7 +96,7 @@ fn agent(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
 }
 
 /// Reference minus agent: what the action, which is added to the reference, has to make up for.
-fn errors(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
+pub(in crate::task) fn errors(model: &CharacterModel, scene: &ObservationInputs, w: &mut Writer) {
     let (links, next) = (scene.links, scene.next);
     let root = &links[0];
     let into_root = |v: Vector3<f32>| root.pose.rotation.inverse_transform_vector(&v);
@@ -111,7 +128,7 @@ fn phase(phase: f32, w: &mut Writer) {
 }
 
 /// A later moment of the reference: its root against the agent's, its joints and contacts.
-fn further_ahead(
+pub(in crate::task) fn further_ahead(
     model: &CharacterModel,
     root: &LinkState,
     sample: &ReferenceState,
