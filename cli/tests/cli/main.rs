@@ -20,6 +20,7 @@ mod runs;
 mod shown;
 mod spared;
 mod stages;
+mod steered;
 mod talk;
 mod told;
 mod training;
