@@ -31,9 +31,9 @@ pub use imitate::{
 pub use model::{CharacterModel, SolePoint};
 pub use settings::{TASKS, TaskSettings};
 pub use starts::{Moment, Span, StartDistribution, Tally};
-pub use steer::{InputSettings, Role, Steer, SteerSettings, Traits, Wish};
+pub use steer::{InputSettings, Role, Steer, SteerSettings, Traits};
 pub use step::{
     Block, Case, EpisodeStart, Failure, Input, MAX_TERMS, Outcome, Purpose, ReferenceState,
-    StartState, Step, TermValues, size,
+    StartState, Step, TermValues, Wish, size,
 };
 pub use verdict::{Performance, Verdict};

@@ -2,10 +2,9 @@
 
 use super::disturbance::Perturbations;
 use super::dynamics::Dynamics;
-use super::steer::Wish;
 use crate::sim::LinkState;
 use arrayvec::ArrayVec;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Most reward terms that a task can have.
@@ -81,6 +80,15 @@ pub enum StartState {
     Reference(f64),
     /// Standing still in the rest pose, where the case begins.
     Rest,
+}
+
+/// What a player asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wish {
+    /// Velocity over the ground, world axes, m/s.
+    pub velocity: Vector2<f32>,
+    /// Direction to face, radians from the world's X axis to the left; `None` to face where it goes.
+    pub facing: Option<f32>,
 }
 
 /// What a player or a script asks of a character between two control steps.

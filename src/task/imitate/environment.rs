@@ -16,8 +16,9 @@ use crate::task::environment::{Draws, Environment};
 use crate::task::error::TaskError;
 use crate::task::model::CharacterModel;
 use crate::task::starts::{Moment, uniform};
-use crate::task::steer::Wish;
-use crate::task::step::{EpisodeStart, Failure, Input, Outcome, Purpose, ReferenceState, Step};
+use crate::task::step::{
+    EpisodeStart, Failure, Input, Outcome, Purpose, ReferenceState, Step, Wish,
+};
 use nalgebra::Vector3;
 use rand_chacha::rand_core::Rng;
 use std::sync::Arc;

@@ -5,7 +5,6 @@ use super::guide::Guide;
 use super::observe::{AHEAD, observe};
 use super::player::Player;
 use super::settings::SteerSettings;
-use super::walker::Wish;
 use crate::humanoid::Slot;
 use crate::sim::{Diverged, LinkState, Target, World};
 use crate::task::disturbance::{Disturbance, Perturbations};
@@ -15,7 +14,9 @@ use crate::task::error::TaskError;
 use crate::task::imitate::{ObservationInputs, Terms, aim, anchor, failure, terms};
 use crate::task::model::CharacterModel;
 use crate::task::starts::Moment;
-use crate::task::step::{EpisodeStart, Failure, Input, Outcome, Purpose, ReferenceState, Step};
+use crate::task::step::{
+    EpisodeStart, Failure, Input, Outcome, Purpose, ReferenceState, StartState, Step, Wish,
+};
 use nalgebra::{Isometry3, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -24,6 +25,9 @@ use std::sync::Arc;
 /// Control steps that the animated character takes before the first episode of an environment, so that training begins
 /// anywhere in what players ask for.
 const WARM_UP: u32 = 90;
+
+/// Distance from the origin at which an episode of training begins at most, metres. Chosen.
+const FARTHEST_M: f32 = 50.0;
 
 /// An environment of [`Steer`].
 pub(super) struct Steering {
@@ -145,6 +149,17 @@ impl Steering {
         }
     }
 
+    /// Moves the animated character back to the origin when it has gone far: single precision is for what is near.
+    fn come_home(&mut self) {
+        let away = self.next.links[0].pose.translation.vector.xy();
+        if away.norm() > FARTHEST_M {
+            self.guide.shift(&-away);
+            for link in &mut self.next.links {
+                link.pose.translation.vector -= away.push(0.0);
+            }
+        }
+    }
+
     /// Shoves the trunk if the disturbance or a player asks for it; two shoves at once add up.
     fn push_trunk(&mut self) {
         let mass = self.model.skeleton.total_mass() as f32;
@@ -249,6 +264,7 @@ impl Environment for Steering {
                 self.look_ahead();
             }
         }
+        self.come_home();
         self.begin();
         if self.settings.perturbations.is_on() {
             self.disturb(self.settings.perturbations, draws.rng.next_u64());
@@ -261,8 +277,8 @@ impl Environment for Steering {
             return Err(TaskError::NoSuchCase { number, cases: 1 });
         }
         let share = match start.state {
-            crate::task::step::StartState::Reference(share) => share,
-            crate::task::step::StartState::Rest => 0.0,
+            StartState::Reference(share) => share,
+            StartState::Rest => 0.0,
         };
         self.rng = ChaCha8Rng::seed_from_u64((share * 1e6).round() as u64);
         self.settings.episode_s = self.limit();
@@ -329,7 +345,10 @@ impl Environment for Steering {
         let terms = self.compare();
         let reward = terms.total(self.settings.rewards.weights());
         let outcome = self.outcome(reward);
-        self.hold_back();
+        // An agent that failed may have been flung anywhere.
+        if !matches!(outcome, Outcome::Failed(_)) {
+            self.hold_back();
+        }
         std::mem::swap(&mut self.now, &mut self.next);
         if !self.scripted {
             let dt = self.dt();

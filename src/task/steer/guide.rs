@@ -1,8 +1,9 @@
 //! The animated character that a simulated one follows, with velocities.
 
 use super::gaits::Gaits;
-use super::walker::{Scratch, Walker, Wish};
+use super::walker::{Scratch, Walker};
 use crate::sim::LinkState;
+use crate::task::step::Wish;
 use nalgebra::{Isometry3, Vector2};
 use std::sync::Arc;
 

@@ -22,7 +22,6 @@ mod walker;
 
 pub use role::{Role, Traits};
 pub use settings::{InputSettings, SteerSettings};
-pub use walker::Wish;
 
 use super::environment::{Environment, Task};
 use super::episode::{Episode, Measure};

@@ -1,13 +1,13 @@
 //! What the policy sees: the agent, what it lacks against the animated character, what is asked for, and what comes next. There is
 //! no phase.
 
-use super::walker::Wish;
 use crate::task::imitate::{
     ObservationInputs, Writer, agent, agent_layout, ahead_layout, error_layout, errors,
     further_ahead, heading,
 };
 use crate::task::model::CharacterModel;
 use crate::task::step::Block;
+use crate::task::step::Wish;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The moments of the animated character that are seen beside the next control step's, seconds after it.

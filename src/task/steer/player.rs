@@ -1,8 +1,8 @@
 //! A player who asks for something new every few seconds.
 
 use super::settings::InputSettings;
-use super::walker::Wish;
 use crate::task::starts::uniform;
+use crate::task::step::Wish;
 use nalgebra::Vector2;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -2,7 +2,6 @@ use super::gaits::Gaits;
 use super::guide::Guide;
 use super::role::{Role, Traits};
 use super::space::apart;
-use super::walker::Wish;
 use super::{Steer, SteerSettings};
 use crate::import;
 use crate::motion::Motion;
@@ -11,7 +10,7 @@ use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
 use crate::task::model::CharacterModel;
 use crate::task::{
-    EpisodeStart, Input, Outcome, Purpose, StartState, Task, TaskError, TaskSettings, step,
+    EpisodeStart, Input, Outcome, Purpose, StartState, Task, TaskError, TaskSettings, Wish, step,
 };
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};

@@ -6,6 +6,7 @@ use super::gaits::Gaits;
 use super::pose::{Mix, Pose};
 use super::space::{Stride, apart};
 use super::spring::Spring;
+use crate::task::step::Wish;
 use nalgebra::{Isometry3, Point3, Rotation2, Translation3, UnitQuaternion, Vector2, Vector3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -40,15 +41,6 @@ const CLOSING: f32 = 0.9;
 const LEANS: f32 = 0.4;
 /// … and gravity, m/s².
 const GRAVITY: f32 = 9.81;
-
-/// What a player asks for.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wish {
-    /// Velocity over the ground, world axes, m/s.
-    pub velocity: Vector2<f32>,
-    /// Direction to face, radians from the world's X axis to the left; `None` to face where it goes.
-    pub facing: Option<f32>,
-}
 
 /// Where a walker is and how it goes on.
 #[derive(Clone, Copy, Debug)]
