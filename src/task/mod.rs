@@ -9,6 +9,7 @@ mod dynamics;
 mod environment;
 mod episode;
 mod error;
+mod follow;
 mod imitate;
 mod model;
 mod settings;
@@ -24,9 +25,10 @@ pub use environment::{Draws, Environment, Stepping, Task, frame, step, step_toge
 pub(crate) use episode::mean;
 pub use episode::{Episode, Frame, Good, Measure, Unit};
 pub use error::TaskError;
+pub use follow::{Actions, Kernels, ObservationInputs, Rewards, TERM_NAMES, Terminations, Terms};
 pub use imitate::{
-    Actions, Imitate, ImitationSettings, Kernels, ObservationInputs, Observations, Placement,
-    Reference, Rewards, TERM_NAMES, Terminations, Terms, layout, observation_size, observe,
+    Imitate, ImitationSettings, Observations, Placement, Reference, layout, observation_size,
+    observe,
 };
 pub use model::{CharacterModel, SolePoint};
 pub use settings::{TASKS, TaskSettings};

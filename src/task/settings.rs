@@ -3,9 +3,8 @@
 use super::disturbance::Perturbations;
 use super::environment::Task;
 use super::error::TaskError;
-use super::imitate::{
-    self, Actions, Imitate, ImitationSettings, Observations, Rewards, Terminations,
-};
+use super::follow::{Actions, Rewards, Terminations};
+use super::imitate::{self, Imitate, ImitationSettings, Observations};
 use super::model::CharacterModel;
 use super::steer::{self, InputSettings, Steer, SteerSettings};
 use crate::motion::Motion;

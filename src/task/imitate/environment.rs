@@ -2,18 +2,18 @@
 
 mod start;
 
-use super::aim::aim;
-use super::observe::{ObservationInputs, observe};
+use super::observe::observe;
 use super::playback::Playback;
 use super::reference::Reference;
-use super::reward::{Terms, terms};
-use super::settings::{ImitationSettings, Terminations};
-use super::terminate::{failure, mean_distance};
+use super::settings::ImitationSettings;
 use crate::sim::{Diverged, Target, World};
 use crate::task::disturbance::{Disturbance, Perturbations};
 use crate::task::dynamics::Dynamics;
 use crate::task::environment::{Draws, Environment};
 use crate::task::error::TaskError;
+use crate::task::follow::{
+    ObservationInputs, Terminations, Terms, aim, failure, mean_distance, terms,
+};
 use crate::task::model::CharacterModel;
 use crate::task::starts::{Moment, uniform};
 use crate::task::step::{

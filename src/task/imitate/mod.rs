@@ -4,7 +4,6 @@
 //! the policy sees. Every observation block, reward term and termination rule is a pure function that training, evaluation,
 //! plots and tests all call.
 
-mod aim;
 mod blend;
 mod clock;
 mod environment;
@@ -13,33 +12,24 @@ mod observe;
 mod placement;
 mod playback;
 mod reference;
-mod reward;
 mod settings;
-mod terminate;
 #[cfg(test)]
 mod tests;
 mod touch;
 mod transition;
 mod verdict;
 
-pub(super) use aim::aim;
 pub(super) use measures::measures;
-pub use observe::{ObservationInputs, layout, observation_size, observe};
-pub(super) use observe::{
-    Writer, agent, agent_layout, ahead_layout, error_layout, errors, further_ahead,
-};
+pub use observe::{layout, observation_size, observe};
 pub use placement::Placement;
-pub(super) use placement::{anchor, heading};
 pub use reference::Reference;
-pub(super) use reward::terms;
-pub use reward::{Kernels, TERM_NAMES, Terms};
-pub use settings::{Actions, ImitationSettings, Observations, Rewards, Terminations};
-pub(super) use terminate::failure;
+pub use settings::{ImitationSettings, Observations};
 pub(super) use verdict::verdict;
 
 use super::environment::{Environment, Task};
 use super::episode::{Episode, Measure};
 use super::error::TaskError;
+use super::follow::TERM_NAMES;
 use super::starts::{Span, StartDistribution};
 use super::step::{Block, Case, Purpose};
 use super::verdict::{Performance, Verdict};

@@ -1,7 +1,7 @@
 //! Where on the ground a motion is performed, and which way it faces.
 
 use crate::sim::LinkState;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 /// Where and how a motion is performed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,18 +30,6 @@ impl Placement {
             pace: 1.0,
         }
     }
-}
-
-/// The place on the ground below a pose, facing where its x axis does.
-pub(in crate::task) fn anchor(pose: &Isometry3<f32>) -> Isometry3<f32> {
-    let at = pose.translation.vector;
-    Isometry3::from_parts(Translation3::new(at.x, at.y, 0.0), heading(&pose.rotation))
-}
-
-/// The turn about the vertical that carries the world's x axis to where the rotation's x axis points along the ground.
-pub(in crate::task) fn heading(turn: &UnitQuaternion<f32>) -> UnitQuaternion<f32> {
-    let forward = turn * Vector3::x();
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), forward.y.atan2(forward.x))
 }
 
 /// The state of a link that `offset` has carried to another place.

@@ -1,12 +1,13 @@
 //! The reference motion as link states, at any time.
 
-use super::placement::{Placement, anchor, moved};
+use super::placement::{Placement, moved};
 use super::touch::may_touch;
 use crate::clip::LoopMode;
 use crate::motion::{Cycle, Motion};
 use crate::sim::LinkState;
 use crate::task::dynamics::{Dynamics, Masses};
 use crate::task::error::TaskError;
+use crate::task::follow::anchor;
 use crate::task::model::CharacterModel;
 use crate::task::step::ReferenceState;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

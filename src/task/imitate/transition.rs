@@ -2,8 +2,9 @@
 
 use super::blend::Blend;
 use super::clock::{Clock, EASE_IN_S, left};
-use super::placement::{Placement, anchor};
+use super::placement::Placement;
 use crate::sim::{Character, LinkState};
+use crate::task::follow::anchor;
 use crate::task::step::ReferenceState;
 use nalgebra::{Isometry3, Translation3, Vector3};
 

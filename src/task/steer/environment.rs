@@ -11,7 +11,7 @@ use crate::task::disturbance::{Disturbance, Perturbations};
 use crate::task::dynamics::{Dynamics, Masses};
 use crate::task::environment::{Draws, Environment};
 use crate::task::error::TaskError;
-use crate::task::imitate::{ObservationInputs, Terms, aim, anchor, failure, terms};
+use crate::task::follow::{ObservationInputs, Terms, aim, anchor, failure, terms};
 use crate::task::model::CharacterModel;
 use crate::task::starts::Moment;
 use crate::task::step::{

@@ -26,7 +26,7 @@ pub use settings::{InputSettings, SteerSettings};
 use super::environment::{Environment, Task};
 use super::episode::{Episode, Measure};
 use super::error::TaskError;
-use super::imitate::TERM_NAMES;
+use super::follow::TERM_NAMES;
 use super::starts::{Span, StartDistribution};
 use super::step::{Block, Case, Purpose};
 use super::verdict::{Performance, Verdict};

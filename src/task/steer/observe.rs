@@ -1,7 +1,7 @@
 //! What the policy sees: the agent, what it lacks against the animated character, what is asked for, and what comes next. There is
 //! no phase.
 
-use crate::task::imitate::{
+use crate::task::follow::{
     ObservationInputs, Writer, agent, agent_layout, ahead_layout, error_layout, errors,
     further_ahead, heading,
 };

@@ -4,7 +4,7 @@ use crate::schema;
 use crate::sim::Settings;
 use crate::task::disturbance::Perturbations;
 use crate::task::error::TaskError;
-use crate::task::imitate::{Actions, Rewards, Terminations};
+use crate::task::follow::{Actions, Rewards, Terminations};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 //! as in its published program (marathon-envs, StyleTransfer002): the targets before, and three sensors under each foot.
 //! On `skeletons/marathon.xml`, 17 bodies and 21 drives, these are the paper's 258 numbers.
 
-use super::inputs::{ObservationInputs, Writer};
+use crate::task::follow::{ObservationInputs, Writer};
 use crate::task::model::CharacterModel;
 use nalgebra::Point3;
 

@@ -1,8 +1,8 @@
 //! The state of Peng et al. 2018, "DeepMimic", section 4, with rotations as two axes as in the authors' program: of 15
 //! bodies 227 numbers.
 
-use super::inputs::{ObservationInputs, Writer};
-use crate::task::imitate::placement::heading;
+use crate::task::follow::heading;
+use crate::task::follow::{ObservationInputs, Writer};
 use crate::task::model::CharacterModel;
 use nalgebra::Vector3;
 

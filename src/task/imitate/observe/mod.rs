@@ -3,18 +3,12 @@
 
 mod booth;
 mod deepmimic;
-mod inputs;
 mod tracking;
 
-pub use inputs::ObservationInputs;
-
 use super::settings::Observations;
+use crate::task::follow::{ObservationInputs, Writer};
 use crate::task::model::CharacterModel;
 use crate::task::step::Block;
-pub(in crate::task) use inputs::Writer;
-pub(in crate::task) use tracking::{
-    agent, agent_layout, ahead_layout, error_layout, errors, further_ahead,
-};
 
 /// The blocks of an observation in order, for a motion with `contacts` contact bodies.
 pub fn layout(kind: Observations, model: &CharacterModel, contacts: usize) -> Vec<Block> {

@@ -7,14 +7,14 @@ mod transitions;
 mod verdict;
 
 use super::environment::Imitation;
-use super::observe::{ObservationInputs, layout, observation_size, observe};
-use super::terminate::failure;
+use super::observe::{layout, observation_size, observe};
 use super::*;
 use crate::import;
 use crate::retarget;
 use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
 use crate::task::dynamics::Masses;
+use crate::task::follow::{ObservationInputs, Terminations, failure};
 use crate::task::{
     EpisodeStart, Failure, Outcome, Perturbations, ReferenceState, StartState, TaskError, step,
 };

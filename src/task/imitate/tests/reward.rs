@@ -4,7 +4,7 @@ use super::{model, sample};
 use crate::sim::LinkState;
 use crate::skeleton::Skeleton;
 use crate::task::dynamics::Masses;
-use crate::task::imitate::reward::terms;
+use crate::task::follow::terms;
 use crate::task::{CharacterModel, ImitationSettings, Kernels, Rewards, TERM_NAMES, Terms};
 use nalgebra::{UnitQuaternion, Vector3};
 

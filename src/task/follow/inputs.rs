@@ -23,7 +23,7 @@ pub struct ObservationInputs<'a> {
 }
 
 /// Writes values one after the other.
-pub(in crate::task) struct Writer<'a> {
+pub struct Writer<'a> {
     out: &'a mut [f32],
     at: usize,
 }

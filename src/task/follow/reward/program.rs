@@ -5,7 +5,7 @@ use super::errors::{body, joint_error, joint_rate};
 use super::term_values::Terms;
 use crate::sim::LinkState;
 use crate::task::dynamics::Dynamics;
-use crate::task::imitate::placement::heading;
+use crate::task::follow::heading;
 use crate::task::model::CharacterModel;
 use nalgebra::Vector3;
 

@@ -6,7 +6,7 @@ use crate::skeleton::Drive;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Writes the targets that `action` stands for, one per link; `wanted` is the reference at the next control step.
-pub(in crate::task) fn aim(
+pub fn aim(
     actions: Actions,
     character: &Character,
     wanted: &[LinkState],
