@@ -132,6 +132,9 @@ impl Rewards {
 
     /// A weight for a term that the kernels don't have would only make every reward smaller, and rewards are divided by the
     /// sum of the weights.
+    ///
+    /// # Errors
+    /// A weight for a term that the kernels don't have, or no weight at all.
     pub fn check(&self) -> Result<(), TaskError> {
         let weights = self.weights().into_iter().zip(self.kernels.has());
         match TERM_NAMES
