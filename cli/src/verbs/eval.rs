@@ -67,9 +67,9 @@ pub struct Args {
     /// Number of episodes; they start at phases spread evenly over the motion
     #[arg(long, value_name = "N", default_value_t = Options::default().episodes, value_parser = at_least_one, allow_negative_numbers = true)]
     episodes: usize,
-    /// Length of an episode in seconds, for looping motions; others play to their end
-    #[arg(long, value_name = "S", default_value_t = Options::default().seconds, value_parser = seconds, allow_negative_numbers = true)]
-    seconds: f64,
+    /// Length of an episode in seconds, for looping motions; others play to their end [default: 20; 60 for a run that is steered]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    seconds: Option<f64>,
     /// Repeat every episode with shoves and with changed weight and friction, as in the run's training or else the usual ones;
     /// the reference then follows the agent [default: for runs that were trained with disturbances]
     #[arg(long)]
@@ -98,7 +98,7 @@ impl Args {
         let mut run = runs::open(self.run.as_deref())?;
         let options = Options {
             episodes: self.episodes,
-            seconds: self.seconds,
+            seconds: self.seconds.unwrap_or(Options::default().seconds),
             perturbations: runs::perturbations(&run, self.perturb),
         };
         let out = self
@@ -131,12 +131,19 @@ impl Args {
     }
 }
 
-/// The figures of a run that is steered.
 impl Args {
+    /// Evaluates a run that is steered.
     fn steering(&self, mut run: Run, out: Option<Output>, printer: &Printer) -> Outcome {
+        if self.perturb {
+            printer.note(
+                "`--perturb` changes nothing: a run that is steered is always pushed as well",
+            );
+        }
+        let usual = SteeringOptions::default();
         let options = SteeringOptions {
             episodes: self.episodes,
-            ..SteeringOptions::default()
+            seconds: self.seconds.unwrap_or(usual.seconds),
+            ..usual
         };
         let held = match out {
             None if options == SteeringOptions::default() => Some(run.hold()),

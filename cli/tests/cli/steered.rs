@@ -72,9 +72,10 @@ fn a_steered_run_is_trained_and_measured() {
         assert_eq!(report[field], kept[field], "{field}");
     }
     assert_eq!(report["episodes"], 32);
-    // The animated character answers in time, whatever the agent has learned.
-    let runs = bench.mimic(&["runs"]).output().expect("it runs");
-    assert!(runs.status.success());
+    // More than can be kept is refused before anything is performed.
+    let much = ["eval", "run", "--episodes", "1000000", "--seconds", "3600"];
+    let said = bench.complaint(&much, 2);
+    assert!(said.contains("fewer or shorter episodes"), "{said}");
 }
 
 #[test]

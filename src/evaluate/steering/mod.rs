@@ -6,6 +6,7 @@ mod script;
 mod take;
 
 use super::agent::{Agent, EvaluateError};
+use super::episode::check_steps;
 use crate::sim::LANES;
 use crate::task::{
     Environment, EpisodeStart, Input, Outcome, Purpose, StartState, Stepping, step_together,
@@ -72,6 +73,8 @@ pub struct SteeringEvaluation {
 const STANDS_S: f64 = 2.0;
 const WALKS_S: f64 = 3.0;
 const AFTER_S: f64 = 8.0;
+/// Seconds of standing in which drift is measured.
+const STANDING_S: f64 = 60.0;
 /// Seconds between pushes, and of a push.
 const PUSH_EVERY_S: f64 = 3.0;
 const PUSH_S: f64 = 0.1;
@@ -79,13 +82,17 @@ const PUSH_S: f64 = 0.1;
 /// Evaluates a steered agent.
 ///
 /// # Errors
-/// A task of another shape than the agent's.
+/// A task of another shape than the agent's, or more steps than can be kept.
 pub fn evaluate_steering<A: Agent>(
     agent: &A,
     options: &SteeringOptions,
 ) -> Result<SteeringEvaluation, EvaluateError> {
     let hz = agent.task().control_hz();
     let steps = |seconds: f64| (seconds * hz).round() as usize;
+    // Twice the random input, and the other scripts.
+    let free_s = 2.0 * options.episodes as f64 * options.seconds;
+    let tries = options.tries as f64 * (STANDS_S + 2.0 * WALKS_S + 1.0 + AFTER_S);
+    check_steps((free_s + tries + STANDING_S) * hz)?;
     let long = steps(options.seconds);
     let script = |asks: Vec<_>, steps| Script { asks, steps };
     let free: Vec<Script> = (0..options.episodes)
@@ -118,7 +125,7 @@ pub fn evaluate_steering<A: Agent>(
             .goes(0, way, walk)
             .goes(at, way + std::f32::consts::PI, walk)
     });
-    let stand = [script(Vec::new(), steps(60.0)).goes(0, 0.0, 0.0)];
+    let stand = [script(Vec::new(), steps(STANDING_S)).goes(0, 0.0, 0.0)];
     let begun = std::time::Instant::now();
     let free = perform(agent, &free)?;
     let taken: usize = free.iter().map(|take| take.agent.len()).sum();

@@ -70,46 +70,67 @@ const BOUNDS: [Bound; 9] = [
 
 /// Least share of the episodes without a fall, in per cent: without pushes and with them.
 const UPRIGHT: [f64; 2] = [95.0, 90.0];
+/// Least share of the turns that succeed, in per cent.
+const TURNED: f64 = 95.0;
 
 /// The table: what was measured of the simulated character, of the animated one, and which values are good.
 pub fn table(found: &SteeringEvaluation) -> String {
     let mut text = line("steered by random input", "character", "animated", "good");
-    let share = |name: &str, value: f64, least: f64| {
-        let percent = 100.0 * value;
-        let missed = if percent >= least { "" } else { "  missed" };
-        let good = format!("{least:.0} % or more{missed}");
-        line(&format!("  {name}"), &format!("{percent:.1} %"), "", &good)
-    };
     let seconds = found.seconds;
+    let alone = format!("{seconds:.0} s without a fall");
+    let pushed = format!("the same, pushed by {:.0} N·s", found.pushed.impulse_ns);
+    let turns = |of: &Figures| of.turn_180.success;
+    text += &share(&alone, found.survival, None, UPRIGHT[0]);
+    text += &share(&pushed, found.pushed.survival, None, UPRIGHT[1]);
     text += &share(
-        &format!("{seconds:.0} s without a fall"),
-        found.survival,
-        UPRIGHT[0],
+        "turns that succeed",
+        turns(&found.agent),
+        Some(turns(&found.reference)),
+        TURNED,
     );
-    let pushes = format!("the same, pushed by {:.0} N·s", found.pushed.impulse_ns);
-    text += &share(&pushes, found.pushed.survival, UPRIGHT[1]);
     for bound in &BOUNDS {
-        let shown = |figures: &Figures| shown((bound.value)(figures), bound.unit);
-        let missed = match (bound.value)(&found.agent) <= bound.most {
-            true => "",
-            false => "  missed",
-        };
-        let good = format!("{}{} or less{missed}", bound.most, bound.unit);
-        let name = format!("  {}", bound.name);
-        text += &line(&name, &shown(&found.agent), &shown(&found.reference), &good);
+        let of = bound.value;
+        text += &size(
+            bound.name,
+            of(&found.agent),
+            Some(of(&found.reference)),
+            bound.most,
+            bound.unit,
+        );
     }
-    let turned = format!("{:.1} %", 100.0 * found.agent.turn_180.success);
-    let animated = format!("{:.1} %", 100.0 * found.reference.turn_180.success);
-    text += &line("  turns that succeed", &turned, &animated, "95 % or more");
-    let error = format!("{:.1} mm", found.mpjpe_local_mm);
-    text += &line("  body error, root subtracted", &error, "", "40 mm or less");
-    let step = format!("{:.3} ms", found.step_ms);
-    text + &line(
-        "  one control step on one core",
-        &step,
-        "",
-        "0.3 ms or less",
+    text += &size(
+        "body error, root subtracted",
+        found.mpjpe_local_mm,
+        None,
+        40.0,
+        " mm",
+    );
+    text + &size(
+        "one control step on one core",
+        found.step_ms,
+        None,
+        0.3,
+        " ms",
     )
+}
+
+/// A share, of which more is better; `least` is in per cent.
+fn share(name: &str, agent: f64, animated: Option<f64>, least: f64) -> String {
+    let percent = |value: f64| format!("{:.1} %", 100.0 * value);
+    let good = format!("{least:.0} % or more{}", missed(100.0 * agent >= least));
+    let animated = animated.map_or_else(String::new, percent);
+    line(&format!("  {name}"), &percent(agent), &animated, &good)
+}
+
+/// A size, of which less is better.
+fn size(name: &str, agent: f64, animated: Option<f64>, most: f64, unit: &str) -> String {
+    let good = format!("{most}{unit} or less{}", missed(agent <= most));
+    let animated = animated.map_or_else(String::new, |value| shown(value, unit));
+    line(&format!("  {name}"), &shown(agent, unit), &animated, &good)
+}
+
+fn missed(is_good: bool) -> &'static str {
+    if is_good { "" } else { "  missed" }
 }
 
 fn line(name: &str, agent: &str, animated: &str, good: &str) -> String {
